@@ -1,0 +1,1 @@
+//! Symbols that the comparison programs load: each converts types and calls one public function.

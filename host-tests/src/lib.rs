@@ -1,0 +1,1 @@
+//! What the tests share: scene generators, matchers and the table of tolerances.

@@ -1,0 +1,1 @@
+//! Small fixed-size linear algebra without panic paths or unbounded loops.

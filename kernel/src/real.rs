@@ -1,0 +1,180 @@
+//! The scalar of every algorithm: `f32` or `f64`, and the elementary functions by which results stay equal to the bit
+//! on every target.
+//!
+//! This is the only file that calls `libm` and `epipole-sqrt`. `RealField` has methods of the same names (`sqrt`,
+//! `sin`, `max`, ...); the kernel does not use them, because what they call depends on the target and on features.
+
+use nalgebra::RealField;
+
+mod sealed {
+    /// Elementary functions, reached through the free functions of the parent module.
+    pub trait Sealed: Sized {
+        fn raw_sqrt(self) -> Self;
+        fn raw_sin(self) -> Self;
+        fn raw_cos(self) -> Self;
+        fn raw_atan2(self, x: Self) -> Self;
+        fn raw_ln(self) -> Self;
+        fn raw_exp(self) -> Self;
+        fn raw_cbrt(self) -> Self;
+        fn raw_is_finite(self) -> bool;
+    }
+}
+
+/// A floating-point scalar: `f32` or `f64`. Sealed: no other type implements it.
+pub trait Real: RealField + Copy + sealed::Sealed {
+    /// 0
+    const ZERO: Self;
+    /// 1
+    const ONE: Self;
+    /// 2
+    const TWO: Self;
+    /// 1/2
+    const HALF: Self;
+    /// The difference between 1 and the next larger number: 2^-23 for `f32`, 2^-52 for `f64`.
+    const EPSILON: Self;
+    /// The largest finite number.
+    const MAX: Self;
+    /// The smallest positive normal number.
+    const MIN_POSITIVE: Self;
+
+    /// The nearest value of this type to `x` (a constant of a formula, a figure of a table).
+    fn from_f64(x: f64) -> Self;
+    /// The value as `f64`, exactly.
+    fn to_f64(self) -> f64;
+    /// The nearest value of this type to the integer `n`.
+    fn from_u32(n: u32) -> Self;
+}
+
+macro_rules! impl_real {
+    ($t:ident, $sqrt:path, $sin:path, $cos:path, $atan2:path, $ln:path, $exp:path, $cbrt:path) => {
+        impl sealed::Sealed for $t {
+            #[inline(always)]
+            fn raw_sqrt(self) -> Self {
+                $sqrt(self)
+            }
+            #[inline]
+            fn raw_sin(self) -> Self {
+                $sin(self)
+            }
+            #[inline]
+            fn raw_cos(self) -> Self {
+                $cos(self)
+            }
+            #[inline]
+            fn raw_atan2(self, x: Self) -> Self {
+                $atan2(self, x)
+            }
+            #[inline]
+            fn raw_ln(self) -> Self {
+                $ln(self)
+            }
+            #[inline]
+            fn raw_exp(self) -> Self {
+                $exp(self)
+            }
+            #[inline]
+            fn raw_cbrt(self) -> Self {
+                $cbrt(self)
+            }
+            #[inline(always)]
+            fn raw_is_finite(self) -> bool {
+                $t::is_finite(self)
+            }
+        }
+
+        impl Real for $t {
+            const ZERO: Self = 0.0;
+            const ONE: Self = 1.0;
+            const TWO: Self = 2.0;
+            const HALF: Self = 0.5;
+            const EPSILON: Self = $t::EPSILON;
+            const MAX: Self = $t::MAX;
+            const MIN_POSITIVE: Self = $t::MIN_POSITIVE;
+
+            #[inline(always)]
+            fn from_f64(x: f64) -> Self {
+                x as $t
+            }
+            #[inline(always)]
+            fn to_f64(self) -> f64 {
+                self as f64
+            }
+            #[inline(always)]
+            fn from_u32(n: u32) -> Self {
+                n as $t
+            }
+        }
+    };
+}
+
+impl_real!(
+    f32,
+    epipole_sqrt::sqrt_f32,
+    libm::sinf,
+    libm::cosf,
+    libm::atan2f,
+    libm::logf,
+    libm::expf,
+    libm::cbrtf
+);
+impl_real!(f64, epipole_sqrt::sqrt_f64, libm::sin, libm::cos, libm::atan2, libm::log, libm::exp, libm::cbrt);
+
+/// The square root, correctly rounded; NaN for a negative `x`.
+#[inline(always)]
+pub fn sqrt<T: Real>(x: T) -> T {
+    x.raw_sqrt()
+}
+
+/// `(sin x, cos x)`, `x` in radians.
+#[inline]
+pub fn sin_cos<T: Real>(x: T) -> (T, T) {
+    (x.raw_sin(), x.raw_cos())
+}
+
+/// The angle of the point `(x, y)`, in (-pi, pi].
+#[inline]
+pub fn atan2<T: Real>(y: T, x: T) -> T {
+    y.raw_atan2(x)
+}
+
+/// The natural logarithm; NaN for a negative `x`, minus infinity for 0.
+#[inline]
+pub fn ln<T: Real>(x: T) -> T {
+    x.raw_ln()
+}
+
+/// `e^x`.
+#[inline]
+pub fn exp<T: Real>(x: T) -> T {
+    x.raw_exp()
+}
+
+/// The real cube root.
+#[inline]
+pub fn cbrt<T: Real>(x: T) -> T {
+    x.raw_cbrt()
+}
+
+/// The absolute value.
+#[inline(always)]
+pub fn abs<T: Real>(x: T) -> T {
+    if x < T::ZERO { -x } else { x }
+}
+
+/// The larger of two numbers; `b` where they do not compare.
+#[inline(always)]
+pub fn max<T: Real>(a: T, b: T) -> T {
+    if a > b { a } else { b }
+}
+
+/// The smaller of two numbers; `b` where they do not compare.
+#[inline(always)]
+pub fn min<T: Real>(a: T, b: T) -> T {
+    if a < b { a } else { b }
+}
+
+/// False for NaN and the infinities.
+#[inline(always)]
+pub fn is_finite<T: Real>(x: T) -> bool {
+    x.raw_is_finite()
+}
