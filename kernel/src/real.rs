@@ -119,6 +119,13 @@ impl_real!(
 );
 impl_real!(f64, epipole_sqrt::sqrt_f64, libm::sin, libm::cos, libm::atan2, libm::log, libm::exp, libm::cbrt);
 
+/// The nearest value of `T` to a constant. (`T::from_f64` is ambiguous: `RealField` has a method of that name.)
+#[inline(always)]
+#[must_use]
+pub fn lit<T: Real>(x: f64) -> T {
+    <T as Real>::from_f64(x)
+}
+
 /// The square root, correctly rounded; NaN for a negative `x`.
 #[inline(always)]
 pub fn sqrt<T: Real>(x: T) -> T {

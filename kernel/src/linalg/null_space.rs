@@ -1,0 +1,120 @@
+//! Null vectors of a short, wide matrix by Householder reflections.
+//!
+//! The rows `A` of a minimal epipolar problem are factored as `A = L Q'` by reflections from the right; the last
+//! columns of `Q` are an orthonormal basis of what every row is orthogonal to. Never through `A'A`, which squares the
+//! condition number: in single precision that costs half of the digits.
+
+use crate::Real;
+use crate::real::{lit, sqrt};
+
+/// An orthonormal basis of the null space of `M` linearly independent rows of length `N`: `K = N - M` vectors.
+///
+/// `A n_k = 0`, `n_j . n_k = 1` where j = k and 0 elsewhere.
+///
+/// # Input
+/// The rows of `A`. Their scales may differ from one another; the squares of the elements must neither overflow nor
+/// underflow. `K` other than `N - M` does not compile.
+///
+/// # Returns
+/// The basis, or `None` where the rows are linearly dependent to within rounding (the part of a row that is orthogonal
+/// to the rows before it is below `16 EPSILON` of the row) or an element is not finite.
+///
+/// # Accuracy
+/// Backward stable: the basis is that of a matrix within a few `EPSILON` of each row's norm.
+///
+/// # Cost
+/// `M` reflections: no iteration. 5x9: about 900 floating-point operations, 5 square roots, 5 divisions.
+///
+/// # References
+/// A. S. Householder, "Unitary triangularization of a nonsymmetric matrix", Journal of the ACM, 1958.
+///
+/// # Examples
+/// ```
+/// use epipole::linalg::null_space;
+/// let [n] = null_space(&[[1.0_f64, 2.0, 2.0], [0.0, 1.0, -1.0]]).unwrap();
+/// assert!((n[0] + 2.0 * n[1] + 2.0 * n[2]).abs() < 1e-15 && (n[1] - n[2]).abs() < 1e-15);
+/// assert!(null_space::<f64, 2, 3, 1>(&[[1.0, 2.0, 2.0], [2.0, 4.0, 4.0]]).is_none());
+/// ```
+#[inline]
+#[must_use]
+pub fn null_space<T: Real, const M: usize, const N: usize, const K: usize>(
+    rows: &[[T; N]; M],
+) -> Option<[[T; N]; K]> {
+    const { assert!(M + K == N, "the null space of M rows of length N has K = N - M vectors") };
+    // Element (c, r) is element c of row r: the loops over r are independent of one another.
+    let mut a = [[T::ZERO; M]; N];
+    for r in 0..M {
+        for c in 0..N {
+            a[c][r] = rows[r][c];
+        }
+    }
+    let tolerance = lit::<T>(16.0) * T::EPSILON;
+    let mut norm_sq = [T::ZERO; M];
+    for c in 0..N {
+        for r in 0..M {
+            norm_sq[r] += a[c][r] * a[c][r];
+        }
+    }
+    // Reflection k is I - v_k v_k' / (alpha_k v_kk), v_k stored in column k from row k downwards.
+    let mut scale = [T::ZERO; M];
+    let mut full_rank = true;
+    for k in 0..M {
+        // Products of what is left of row k with itself and with the rows after it, in one pass.
+        let mut dot = [T::ZERO; M];
+        for c in k..N {
+            let v = a[c][k];
+            for r in k..M {
+                dot[r] += v * a[c][r];
+            }
+        }
+        let head = a[k][k];
+        let length = sqrt(dot[k]);
+        full_rank &= dot[k] > tolerance * tolerance * norm_sq[k];
+        // The sign that adds: v_kk = head - alpha without cancellation.
+        let alpha = if head > T::ZERO { -length } else { length };
+        let v_kk = head - alpha;
+        a[k][k] = v_kk;
+        scale[k] = T::ONE / (alpha * v_kk);
+        for r in k + 1..M {
+            // v' a_r = (what is left of row k)' a_r - alpha a_kr
+            dot[r] = (dot[r] - alpha * a[k][r]) * scale[k];
+        }
+        for c in k..N {
+            let v = a[c][k];
+            for r in k + 1..M {
+                a[c][r] += v * dot[r];
+            }
+        }
+    }
+    if !full_rank {
+        return None;
+    }
+    // The reflections applied, the last first, to the last K unit vectors.
+    let mut q = [[T::ZERO; K]; N];
+    for j in 0..K {
+        q[M + j][j] = T::ONE;
+    }
+    for k in (0..M).rev() {
+        let mut dot = [T::ZERO; K];
+        for c in k..N {
+            for j in 0..K {
+                dot[j] += a[c][k] * q[c][j];
+            }
+        }
+        for j in 0..K {
+            dot[j] *= scale[k];
+        }
+        for c in k..N {
+            for j in 0..K {
+                q[c][j] += a[c][k] * dot[j];
+            }
+        }
+    }
+    let mut basis = [[T::ZERO; N]; K];
+    for j in 0..K {
+        for c in 0..N {
+            basis[j][c] = q[c][j];
+        }
+    }
+    Some(basis)
+}
