@@ -185,3 +185,9 @@ pub fn min<T: Real>(a: T, b: T) -> T {
 pub fn is_finite<T: Real>(x: T) -> bool {
     x.raw_is_finite()
 }
+
+/// The nearest value of `T` to the integer `n`.
+#[inline(always)]
+pub fn from_u32<T: Real>(n: u32) -> T {
+    <T as Real>::from_u32(n)
+}

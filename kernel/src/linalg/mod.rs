@@ -1,7 +1,40 @@
 //! Small fixed-size linear algebra without panic paths or unbounded loops.
 
+use nalgebra::SMatrix;
+
+use crate::Real;
+use crate::real::{abs, is_finite, max};
+
+mod eigen;
+mod ldlt;
+mod lu;
 mod null_space;
 mod row_qr;
+mod svd3;
 
+pub use eigen::{SymmetricEigen, symmetric_eigen};
+pub use ldlt::Ldlt;
+pub use lu::Lu;
 pub use null_space::null_space;
 pub use row_qr::{LeastSingular, RowQr};
+pub use svd3::{Svd3, svd3};
+
+fn identity<T: Real, const N: usize>() -> SMatrix<T, N, N> {
+    let mut result = SMatrix::zeros();
+    for i in 0..N {
+        result.data.0[i][i] = T::ONE;
+    }
+    result
+}
+
+/// The largest absolute value; `None` where one is NaN or infinite.
+fn largest_magnitude<'a, T: Real>(elements: impl Iterator<Item = &'a T>) -> Option<T> {
+    let mut largest = T::ZERO;
+    for &x in elements {
+        if !is_finite(x) {
+            return None;
+        }
+        largest = max(abs(x), largest);
+    }
+    Some(largest)
+}
