@@ -1,1 +1,17 @@
-//! What the tests share: scene generators, matchers and the table of tolerances.
+//! What the tests share: seeded random numbers, scene generators, matchers that know the symmetries, and the one table
+//! of tolerances.
+//!
+//! Scenes and truths are made in `f64`; measurements are rounded to the scalar under test where they are handed out, so
+//! that one seed is the same problem in `f32` and `f64`.
+//!
+//! A failing case prints its seed; `EPIPOLE_SEED=<seed> cargo test -p epipole-host-tests <test>` runs that case alone.
+
+pub mod cases;
+pub mod matchers;
+pub mod rng;
+pub mod scenes;
+pub mod tolerances;
+
+pub use cases::{Share, for_each_case, share_of};
+pub use rng::Rng;
+pub use scenes::{AbsoluteScene, Motion, Scene, Shape, TwoView};

@@ -1,0 +1,46 @@
+//! The one table of tolerances. A test that needs a bound takes it here; a bound is loosened here or nowhere, and never
+//! without a reason.
+
+use epipole::Real;
+
+/// An upper bound on an error, for each scalar.
+#[derive(Clone, Copy, Debug)]
+pub struct Tolerance {
+    /// The bound in `f32`.
+    pub f32: f64,
+    /// The bound in `f64`.
+    pub f64: f64,
+    /// Why this and not less.
+    pub reason: &'static str,
+}
+
+impl Tolerance {
+    /// The bound for the scalar `T`.
+    pub fn of<T: Real>(&self) -> f64 {
+        if size_of::<T>() == 4 { self.f32 } else { self.f64 }
+    }
+}
+
+macro_rules! table {
+    ($($name:ident: $f32:expr, $f64:expr, $reason:expr;)*) => {
+        $(#[doc = $reason]
+        pub const $name: Tolerance = Tolerance { f32: $f32, f64: $f64, reason: $reason };)*
+
+        /// Every tolerance with its name.
+        pub const TABLE: &[(&str, Tolerance)] = &[$((stringify!($name), $name)),*];
+    };
+}
+
+table! {
+    SOLVED_ROTATION: 1e-3, 1e-6,
+        "radians; the field's own bound for a noise-free problem solved, so that shares compare with published ones";
+    ROUNDING: 1e-6, 2e-15,
+        "a dozen rounded operations on numbers near 1";
+    ROTATION: 2e-6, 4e-15,
+        "radians or matrix entries; a product, inverse or conversion of rotations, each entry a sum of a few products";
+    ESSENTIAL_CONSTRAINT: 2e-5, 1e-12,
+        "det and the cubic trace constraint of a unit-norm E out of a well-conditioned solver";
+    EPIPOLAR_RESIDUAL: 2e-5, 1e-11,
+        "x2' E x1 of unit-norm E and bearings on the minimal sample; the sample's null space is exact to rounding, \
+         the solver's root moves it by its own error";
+}
