@@ -1,10 +1,12 @@
 //! Cameras, poses and the relations between two views.
 
+pub mod camera;
 mod essential;
 mod fundamental;
 mod homography;
 pub mod pose;
 
+pub use camera::{BrownConrady, Camera, CameraError, CameraModel, KannalaBrandt, Pinhole, UnprojectError};
 pub use essential::Essential;
 pub use fundamental::Fundamental;
 pub use homography::Homography;

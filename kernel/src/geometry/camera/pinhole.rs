@@ -1,0 +1,168 @@
+//! The pinhole camera: `u = fx x/z + cx`, `v = fy y/z + cy`.
+
+use nalgebra::{Matrix2x3, Matrix2x4, Matrix3, Matrix3x2, Vector2, Vector3};
+
+use super::{CameraError, CameraModel, UnprojectError, bearing_of_plane_point, finite};
+use crate::Real;
+use crate::real::is_finite;
+
+/// Focal lengths and principal point in pixels; points in front of the camera, `z > 0`.
+///
+/// # References
+/// R. Hartley, A. Zisserman, "Multiple View Geometry in Computer Vision", 2nd edition, Cambridge University Press,
+/// 2003, chapter 6.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pinhole<T: Real> {
+    fx: T,
+    fy: T,
+    cx: T,
+    cy: T,
+}
+
+impl<T: Real> Pinhole<T> {
+    /// A camera of these focal lengths and this principal point, in pixels.
+    ///
+    /// # Errors
+    /// [`CameraError`] names the first parameter that is not finite, or the focal length that is not positive.
+    ///
+    /// # Examples
+    /// ```
+    /// use epipole::geometry::{CameraError, Pinhole};
+    /// let error = Pinhole::new(500.0_f32, 0.0, 320.0, 240.0).unwrap_err();
+    /// assert_eq!(error, CameraError::NotPositive { parameter: "fy" });
+    /// ```
+    pub fn new(fx: T, fy: T, cx: T, cy: T) -> Result<Self, CameraError> {
+        CameraError::check_finite(&["fx", "fy", "cx", "cy"], &[fx, fy, cx, cy])?;
+        for (parameter, f) in [("fx", fx), ("fy", fy)] {
+            if f <= T::ZERO {
+                return Err(CameraError::NotPositive { parameter });
+            }
+        }
+        Ok(Self { fx, fy, cx, cy })
+    }
+
+    /// Horizontal focal length, px.
+    #[must_use]
+    pub fn fx(&self) -> T {
+        self.fx
+    }
+
+    /// Vertical focal length, px.
+    #[must_use]
+    pub fn fy(&self) -> T {
+        self.fy
+    }
+
+    /// Principal point, px from the left.
+    #[must_use]
+    pub fn cx(&self) -> T {
+        self.cx
+    }
+
+    /// Principal point, px from the top.
+    #[must_use]
+    pub fn cy(&self) -> T {
+        self.cy
+    }
+
+    /// `K = [fx 0 cx; 0 fy cy; 0 0 1]`: pixels `x ~ K X`.
+    #[must_use]
+    pub fn matrix(&self) -> Matrix3<T> {
+        let (o, i) = (T::ZERO, T::ONE);
+        Matrix3::new(self.fx, o, self.cx, o, self.fy, self.cy, o, o, i)
+    }
+
+    /// `K^-1`: normalised coordinates of pixels. Not finite for a focal length whose inverse is not.
+    #[must_use]
+    pub fn inverse_matrix(&self) -> Matrix3<T> {
+        let (o, i) = (T::ZERO, T::ONE);
+        let (a, b) = (i / self.fx, i / self.fy);
+        Matrix3::new(a, o, -self.cx * a, o, b, -self.cy * b, o, o, i)
+    }
+
+    /// The pixel of a point of the plane z = 1.
+    #[inline]
+    pub(super) fn to_pixel(self, p: &Vector2<T>) -> Vector2<T> {
+        Vector2::new(self.fx * p.x + self.cx, self.fy * p.y + self.cy)
+    }
+
+    /// The point of the plane z = 1 at a pixel.
+    #[inline]
+    pub(super) fn to_plane(self, pixel: &Vector2<T>) -> Vector2<T> {
+        Vector2::new((pixel.x - self.cx) / self.fx, (pixel.y - self.cy) / self.fy)
+    }
+
+    /// Rows scaled by the focal lengths: the Jacobian of the pixel from that of the plane point.
+    #[inline]
+    pub(super) fn scale_rows(self, j: &Matrix2x3<T>) -> Matrix2x3<T> {
+        let (a, b) = (self.fx, self.fy);
+        Matrix2x3::new(a * j.m11, a * j.m12, a * j.m13, b * j.m21, b * j.m22, b * j.m23)
+    }
+
+    /// Columns divided by the focal lengths: the Jacobian by the pixel from that by the plane point.
+    #[inline]
+    pub(super) fn unscale_columns(self, j: &Matrix3x2<T>) -> Matrix3x2<T> {
+        let (a, b) = (T::ONE / self.fx, T::ONE / self.fy);
+        Matrix3x2::new(j.m11 * a, j.m12 * b, j.m21 * a, j.m22 * b, j.m31 * a, j.m32 * b)
+    }
+
+    /// The Jacobian of the pixel by `(fx, fy, cx, cy)`; none where the point has no pixel.
+    #[must_use]
+    pub fn intrinsics_jacobian(&self, point: &Vector3<T>) -> Option<Matrix2x4<T>> {
+        self.project(point)?;
+        let (o, i) = (T::ZERO, T::ONE);
+        let j = Matrix2x4::new(point.x / point.z, o, i, o, o, point.y / point.z, o, i);
+        finite(j, j.as_slice())
+    }
+}
+
+/// The point of the plane z = 1 and its Jacobian by the point; the caller has checked `z > 0`.
+#[inline]
+pub(super) fn plane_point<T: Real>(point: &Vector3<T>) -> (Vector2<T>, Matrix2x3<T>) {
+    let w = T::ONE / point.z;
+    let p = Vector2::new(point.x / point.z, point.y / point.z);
+    (p, Matrix2x3::new(w, T::ZERO, -p.x * w, T::ZERO, w, -p.y * w))
+}
+
+impl<T: Real> CameraModel<T> for Pinhole<T> {
+    #[inline]
+    fn project(&self, point: &Vector3<T>) -> Option<Vector2<T>> {
+        // `point.z` is finite where z > 0 and the pixel is finite, but for z = +inf, which is refused here.
+        if !(point.z > T::ZERO && point.z <= T::MAX) {
+            return None;
+        }
+        let pixel = self.to_pixel(&Vector2::new(point.x / point.z, point.y / point.z));
+        finite(pixel, pixel.as_slice())
+    }
+
+    #[inline]
+    fn project_with_jacobian(&self, point: &Vector3<T>) -> Option<(Vector2<T>, Matrix2x3<T>)> {
+        let pixel = self.project(point)?;
+        let jacobian = self.scale_rows(&plane_point(point).1);
+        finite((pixel, jacobian), jacobian.as_slice())
+    }
+
+    #[inline]
+    fn unproject(&self, pixel: &Vector2<T>) -> Result<Vector3<T>, UnprojectError> {
+        self.unproject_with_jacobian(pixel).map(|(bearing, _)| bearing)
+    }
+
+    #[inline]
+    fn unproject_with_jacobian(
+        &self,
+        pixel: &Vector2<T>,
+    ) -> Result<(Vector3<T>, Matrix3x2<T>), UnprojectError> {
+        let p = self.to_plane(pixel);
+        // The square of the distance must not overflow, or the bearing would be (0, 0, 0).
+        if !is_finite(p.norm_squared()) {
+            return Err(UnprojectError::NotFinite);
+        }
+        let (bearing, jacobian) = bearing_of_plane_point(&p);
+        let jacobian = self.unscale_columns(&jacobian);
+        finite((bearing, jacobian), jacobian.as_slice()).ok_or(UnprojectError::NotFinite)
+    }
+
+    fn focal(&self) -> T {
+        self.fx * T::HALF + self.fy * T::HALF
+    }
+}
