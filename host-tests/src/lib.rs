@@ -10,6 +10,7 @@ pub mod cases;
 pub mod matchers;
 pub mod rng;
 pub mod scenes;
+pub mod source;
 pub mod tolerances;
 
 pub use cases::{Share, for_each_case, share_of};
