@@ -9,6 +9,7 @@ mod eigen;
 mod ldlt;
 mod lu;
 mod null_space;
+pub mod poly;
 mod row_qr;
 mod svd3;
 

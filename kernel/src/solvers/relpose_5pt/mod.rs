@@ -1,0 +1,85 @@
+//! Relative pose of two calibrated views from five points.
+
+mod cubics;
+mod hidden;
+mod polish;
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::geometry::Essential;
+use crate::linalg::null_space;
+use crate::linalg::poly::projective_roots_10;
+use crate::{Real, Solutions};
+
+/// The essential matrices that five bearing pairs allow: up to ten, each of unit Frobenius norm.
+///
+/// `x2' E x1 = 0` for each pair, `E E' E - tr(E E') E / 2 = 0`, `det E = 0`.
+///
+/// # Input
+/// Bearings in the frames of camera 1 and camera 2, of any length other than zero (unit length is best: the rows
+/// of the linear system are weighted by the product of the lengths).
+///
+/// # Returns
+/// 0 to 10 matrices, in an order that is fixed for an input and has no meaning.
+///
+/// # Degeneracies
+/// No solution where the five equations are linearly dependent (a repeated pair, for example) or a number is not finite.
+///
+/// # References
+/// D. Nistér, "An efficient solution to the five-point relative pose problem", IEEE Transactions on Pattern Analysis
+/// and Machine Intelligence, 2004.
+///
+/// # Examples
+/// ```
+/// use epipole::nalgebra::{Rotation3, Vector3};
+/// let (r, t) = (Rotation3::from_euler_angles(0.1_f64, -0.2, 0.05), Vector3::new(1.0, 0.2, -0.1));
+/// let x1 = [[-1.0, 0.5, 4.0], [1.0, 1.0, 5.0], [0.0, -1.0, 6.0], [-0.5, -0.3, 3.0], [1.0, -0.7, 7.0]].map(Vector3::from);
+/// let x2 = x1.map(|x| r * x + t);
+/// let truth = (t.cross_matrix() * r.matrix()).normalize();
+/// let solutions = epipole::solvers::relpose_5pt(&x1, &x2);
+/// assert!(solutions.iter().any(|e| (e.0 - truth).norm().min((e.0 + truth).norm()) < 1e-12));
+/// ```
+pub fn relpose_5pt<T: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) -> Solutions<Essential<T>, 10> {
+    solve::<T, T>(x1, x2)
+}
+
+/// [`relpose_5pt`] with the polynomial of degree 10 and its roots in `f64`, for a core with a double-precision unit.
+pub fn relpose_5pt_wide(x1: &[Vector3<f32>; 5], x2: &[Vector3<f32>; 5]) -> Solutions<Essential<f32>, 10> {
+    solve::<f32, f64>(x1, x2)
+}
+
+#[inline]
+fn solve<T: Real, W: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) -> Solutions<Essential<T>, 10> {
+    let mut solutions = Solutions::new();
+    let mut rows = [[T::ZERO; 9]; 5];
+    for ((row, a), b) in rows.iter_mut().zip(x1).zip(x2) {
+        *row = [
+            b.x * a.x,
+            b.x * a.y,
+            b.x * a.z,
+            b.y * a.x,
+            b.y * a.y,
+            b.y * a.z,
+            b.z * a.x,
+            b.z * a.y,
+            b.z * a.z,
+        ];
+    }
+    let Some(null) = null_space::<T, 5, 9, 4>(&rows) else { return solutions };
+    let basis: [[T; 4]; 9] = core::array::from_fn(|i| [null[0][i], null[1][i], null[2][i], null[3][i]]);
+    let Some(hidden) = hidden::eliminate(cubics::essential_cubics(&basis)) else { return solutions };
+    let roots = projective_roots_10(&hidden::determinant::<T, W>(&hidden));
+    for root in &roots {
+        let root = root.map(|v| <T as Real>::from_f64(v.to_f64()));
+        let Some(mut c) = hidden::unknowns(&hidden, root) else { continue };
+        let mut step_sq = T::MAX;
+        for _ in 0..2 {
+            (c, step_sq) = polish::newton_step(&basis, &c);
+        }
+        if step_sq <= T::EPSILON {
+            let e = polish::combine(&basis, &c);
+            solutions.push(Essential(Matrix3::new(e[0], e[1], e[2], e[3], e[4], e[5], e[6], e[7], e[8])));
+        }
+    }
+    solutions
+}
