@@ -5,6 +5,7 @@ mod essential;
 mod fundamental;
 mod homography;
 pub mod pose;
+pub mod residual;
 
 pub use camera::{BrownConrady, Camera, CameraError, CameraModel, KannalaBrandt, Pinhole, UnprojectError};
 pub use essential::Essential;

@@ -1,9 +1,10 @@
 //! The rigid motion that maps world points into a camera: `x_cam = R X + t`.
 
-use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix3x2, Quaternion, Translation3, UnitQuaternion, Vector3, Vector6};
 
 use crate::Real;
-use crate::real::sqrt;
+use crate::linalg::{Svd3, svd3};
+use crate::real::{abs, atan2, lit, max, sin_cos, sqrt};
 
 /// A pose maps into the camera: `x_cam = R X + t`. Of two views, the pose of view 2 in the frame of view 1:
 /// `X2 = R X1 + t`, |t| = 1 where scale is unobservable.
@@ -52,4 +53,237 @@ pub fn quaternion_from_matrix<T: Real>(r: &Matrix3<T>) -> UnitQuaternion<T> {
 pub fn skew<T: Real>(v: &Vector3<T>) -> Matrix3<T> {
     let o = T::ZERO;
     Matrix3::new(o, -v.z, v.y, v.z, o, -v.x, -v.y, v.x, o)
+}
+
+/// Taylor's coefficients (-1)^k / (2k + first)! with which the functions of an angle up to 1 rad are exact to rounding.
+const COSINE: [f64; 9] = alternating_inverse_factorials(0);
+const SINE_OVER_ANGLE: [f64; 9] = alternating_inverse_factorials(1);
+const ONE_MINUS_COSINE: [f64; 9] = alternating_inverse_factorials(2);
+const ANGLE_MINUS_SINE: [f64; 9] = alternating_inverse_factorials(3);
+
+const fn alternating_inverse_factorials(first: u32) -> [f64; 9] {
+    let mut c = [0.0; 9];
+    let mut term = 1.0;
+    let mut n = 1;
+    while n <= first {
+        term /= n as f64;
+        n += 1;
+    }
+    let mut k = 0;
+    while k < 9 {
+        c[k] = term;
+        term = -term / (n as f64 * (n + 1) as f64);
+        n += 2;
+        k += 1;
+    }
+    c
+}
+
+/// `c[0] + c[1] s + c[2] s^2 + ..`
+#[inline]
+fn series<T: Real>(c: &[f64; 9], s: T) -> T {
+    c.iter().rev().fold(T::ZERO, |sum, &k| sum * s + lit(k))
+}
+
+/// The length of a vector whose squares may overflow or underflow.
+fn length<T: Real>(v: &Vector3<T>) -> T {
+    let size = max(abs(v.x), max(abs(v.y), abs(v.z)));
+    if size > T::ZERO { sqrt((v / size).norm_squared()) * size } else { T::ZERO }
+}
+
+/// `Exp(w)`: the rotation by the angle |w| (rad) about the axis w.
+///
+/// `q = (cos |w|/2, sin(|w|/2) w/|w|)`. For |w| up to 1 by series, without a call of `sin` or `cos`.
+///
+/// # Accuracy
+/// To rounding at any angle, near 0 and near pi too. A vector that is not finite gives a quaternion that is not.
+///
+/// # Examples
+/// ```
+/// use epipole::geometry::pose::{exp, log};
+/// use epipole::nalgebra::Vector3;
+/// let w = Vector3::new(0.3_f64, -0.2, 3.0);
+/// assert!((log(&exp(&w)) - w).norm() < 1e-14);
+/// ```
+#[must_use]
+pub fn exp<T: Real>(w: &Vector3<T>) -> UnitQuaternion<T> {
+    let square = w.norm_squared();
+    let (cosine, factor) = if square <= T::ONE {
+        let half_sq = square * lit(0.25);
+        (series(&COSINE, half_sq), T::HALF * series(&SINE_OVER_ANGLE, half_sq))
+    } else {
+        let angle = length(w);
+        let (sine, cosine) = sin_cos(angle * T::HALF);
+        (cosine, sine / angle)
+    };
+    UnitQuaternion::new_unchecked(Quaternion::new(cosine, w.x * factor, w.y * factor, w.z * factor))
+}
+
+/// `Log(q)`: the rotation vector of a rotation, angle in [0, pi].
+///
+/// At pi the axis has two signs; the one of the quaternion with `w >= 0` is given.
+///
+/// # Accuracy
+/// To rounding at any angle, near 0 and near pi too (the logarithm of a rotation matrix is not: give a quaternion).
+#[must_use]
+pub fn log<T: Real>(q: &UnitQuaternion<T>) -> Vector3<T> {
+    let (q, w) = (q.as_ref(), q.w);
+    let v = Vector3::new(q.i, q.j, q.k);
+    let (v, w) = if w < T::ZERO { (-v, -w) } else { (v, w) };
+    let sine_sq = v.norm_squared();
+    // 2 atan(|v| / w) / |v|, whose next term is smaller by the square of the sine.
+    if sine_sq <= T::EPSILON {
+        return v * (T::TWO / w * (T::ONE - sine_sq / (w * w) / lit(3.0)));
+    }
+    let sine = sqrt(sine_sq);
+    v * (T::TWO * atan2(sine, w) / sine)
+}
+
+/// The left Jacobian of SO(3): `Exp(w + d) = Exp(J d) Exp(w)` to first order in d.
+///
+/// `J = I + (1 - cos a)/a^2 [w]x + (a - sin a)/a^3 [w]x^2`, a = |w|. By series up to 1 rad.
+///
+/// # Examples
+/// ```
+/// use epipole::geometry::pose::left_jacobian;
+/// use epipole::nalgebra::{Matrix3, Vector3};
+/// assert_eq!(left_jacobian(&Vector3::<f32>::zeros()), Matrix3::identity());
+/// ```
+#[must_use]
+pub fn left_jacobian<T: Real>(w: &Vector3<T>) -> Matrix3<T> {
+    let square = w.norm_squared();
+    let (a, b) = if square <= T::ONE {
+        (series(&ONE_MINUS_COSINE, square), series(&ANGLE_MINUS_SINE, square))
+    } else {
+        let angle = length(w);
+        let (sine, _) = sin_cos(angle * T::HALF);
+        let half = sine / angle;
+        (T::TWO * half * half, (T::ONE - sin_cos(angle).0 / angle) / angle / angle)
+    };
+    let k = skew(w);
+    Matrix3::identity() + k * a + k * k * b
+}
+
+/// The pose moved by `(w, dt)`: `R <- Exp(w) R`, `t <- t + dt`. The order of every covariance of a pose.
+///
+/// The quaternion is normalised anew, so that a long sequence of steps does not drift.
+///
+/// # Examples
+/// ```
+/// use epipole::geometry::{Pose, pose::retract};
+/// use epipole::nalgebra::Vector6;
+/// let moved = retract(&Pose::<f32>::identity(), &Vector6::new(0.0, 0.0, 0.0, 1.0, 2.0, 3.0));
+/// assert_eq!(moved.translation.vector.z, 3.0);
+/// ```
+#[must_use]
+pub fn retract<T: Real>(pose: &Pose<T>, delta: &Vector6<T>) -> Pose<T> {
+    let w = Vector3::new(delta.x, delta.y, delta.z);
+    let q = exp(&w).into_inner() * pose.rotation.into_inner();
+    let rotation = UnitQuaternion::new_unchecked(q * (T::ONE / sqrt(q.coords.norm_squared())));
+    let t = pose.translation.vector + Vector3::new(delta.w, delta.a, delta.b);
+    Pose::from_parts(Translation3::from(t), rotation)
+}
+
+/// The centre of the camera in the world: `-R' t`.
+#[must_use]
+pub fn centre<T: Real>(pose: &Pose<T>) -> Vector3<T> {
+    -(pose.rotation.inverse() * pose.translation.vector)
+}
+
+/// The pose of view 2 in the frame of view 1, of two world-to-camera poses: `R = R2 R1'`, `t = t2 - R t1`.
+///
+/// # Examples
+/// ```
+/// use epipole::geometry::{Pose, pose::relative};
+/// let (first, second) = (Pose::translation(1.0, 0.0, 0.0), Pose::<f64>::translation(0.0, 0.0, 2.0));
+/// assert_eq!(relative(&first, &second), Pose::translation(-1.0, 0.0, 2.0));
+/// ```
+#[must_use]
+pub fn relative<T: Real>(first: &Pose<T>, second: &Pose<T>) -> Pose<T> {
+    let rotation = second.rotation * first.rotation.inverse();
+    let t = second.translation.vector - rotation * first.translation.vector;
+    Pose::from_parts(Translation3::from(t), rotation)
+}
+
+/// The angle between two rotations in [0, pi], rad; the same for q and -q.
+///
+/// By the chords: `4 atan2(|a - b|, |a + b|)`, exact to rounding at any angle, where the arc cosine of the trace is
+/// good to no better than sqrt(EPSILON) near 0 and pi.
+///
+/// # Examples
+/// ```
+/// use epipole::geometry::pose::{exp, rotation_angle};
+/// use epipole::nalgebra::Vector3;
+/// let (a, b) = (exp(&Vector3::new(0.0_f32, 0.0, 1.0)), exp(&Vector3::new(0.0, 0.0, 1.0001)));
+/// assert!((rotation_angle(&a, &b) - 1e-4).abs() < 1e-6);
+/// ```
+#[must_use]
+pub fn rotation_angle<T: Real>(a: &UnitQuaternion<T>, b: &UnitQuaternion<T>) -> T {
+    let near = (a.coords - b.coords).norm_squared();
+    let far = (a.coords + b.coords).norm_squared();
+    let (near, far) = if near <= far { (near, far) } else { (far, near) };
+    lit::<T>(4.0) * atan2(sqrt(near), sqrt(far))
+}
+
+/// The angle between two vectors of any length in [0, pi], rad: `atan2(|a x b|, a . b)`.
+#[must_use]
+pub fn vector_angle<T: Real>(a: &Vector3<T>, b: &Vector3<T>) -> T {
+    atan2(sqrt(a.cross(b).norm_squared()), a.dot(b))
+}
+
+/// An orthonormal basis `[e1, e2]` of the plane tangent to the sphere at the unit vector `n`, `e1 x e2 = n`.
+///
+/// `e1` is `(2, -2, -1)/3` reflected by the reflection that takes `n` to `-(2, 1, 2)/3`, made orthogonal to `n` again
+/// to rounding, and `e2 = n x e1`. No basis is continuous on the whole sphere; this one is but at `n = -(2, 1, 2)/3`,
+/// chosen away from the directions in which cameras move. Covariances of a direction refer to it.
+///
+/// `n` must be a unit vector; it is not checked.
+///
+/// # Examples
+/// ```
+/// use epipole::geometry::pose::tangent_basis;
+/// use epipole::nalgebra::{Matrix2, Vector3};
+/// let n = Vector3::new(0.6_f64, 0.0, -0.8);
+/// let basis = tangent_basis(&n);
+/// assert!((basis.transpose() * basis - Matrix2::identity()).norm() < 1e-15);
+/// assert!((basis.transpose() * n).norm() < 1e-15);
+/// ```
+#[must_use]
+pub fn tangent_basis<T: Real>(n: &Vector3<T>) -> Matrix3x2<T> {
+    let third = T::ONE / lit(3.0);
+    let pole = Vector3::new(T::TWO, T::ONE, T::TWO) * third;
+    let start = Vector3::new(T::TWO, -T::TWO, -T::ONE) * third;
+    let v = n + pole;
+    let square = v.norm_squared();
+    let reflected =
+        if square > T::EPSILON * T::EPSILON { start - v * (T::TWO * v.dot(&start) / square) } else { start };
+    let e1 = reflected - n * n.dot(&reflected);
+    let e1 = e1 * (T::ONE / sqrt(e1.norm_squared()));
+    Matrix3x2::from_columns(&[e1, n.cross(&e1)])
+}
+
+/// The rotation nearest to a matrix in the Frobenius norm: `U diag(1, 1, det(U V')) V'` of `M = U S V'`.
+///
+/// # Returns
+/// None where it is not unique or the matrix is not finite: to within `16 EPSILON` of the largest singular value, the
+/// rank is below 2, or the determinant is negative and the two smaller singular values are equal.
+///
+/// # References
+/// P. H. Schönemann, "A generalized solution of the orthogonal Procrustes problem", Psychometrika 31, 1966; G. Wahba, "A
+/// least squares estimate of satellite attitude", SIAM Review 7, 1965, for the sign.
+///
+/// # Examples
+/// ```
+/// use epipole::geometry::pose::nearest_rotation;
+/// use epipole::nalgebra::Matrix3;
+/// let r = nearest_rotation(&(Matrix3::<f64>::identity() * 3.0)).unwrap();
+/// assert!((r - Matrix3::identity()).norm() < 1e-15);
+/// assert!(nearest_rotation(&Matrix3::<f64>::zeros()).is_none());
+/// ```
+#[must_use]
+pub fn nearest_rotation<T: Real>(m: &Matrix3<T>) -> Option<Matrix3<T>> {
+    let Svd3 { u, s, v } = svd3(m)?;
+    let sign = if u.determinant() < T::ZERO { -T::ONE } else { T::ONE };
+    let unique = s.y + sign * s.z > lit::<T>(16.0) * T::EPSILON * s.x;
+    unique.then(|| u * Matrix3::from_diagonal(&Vector3::new(T::ONE, T::ONE, sign)) * v.transpose())
 }
