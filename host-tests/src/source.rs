@@ -114,7 +114,8 @@ fn flatten_into(stream: &TokenStream, module: &[String], out: &mut Vec<Token>) {
                     inner.push(trees[k - 1].to_string());
                 }
                 flatten_into(&group.stream(), &inner, out);
-                push(close.to_owned(), &trees[k], out);
+                let line = group.span_close().start().line;
+                out.push(Token { text: close.to_owned(), line, module: module.to_vec() });
             }
             TokenTree::Ident(ident) => push(ident.to_string(), &trees[k], out),
             TokenTree::Punct(mark) => push(mark.as_char().to_string(), &trees[k], out),
@@ -224,23 +225,80 @@ fn read_tree(tokens: &[Token], mut at: usize, base: &[String], found: &mut Vec<V
     at
 }
 
-/// The names of all `pub fn`, with the line and the file, methods included.
-pub fn public_functions(tokens: &[Token]) -> Vec<(String, usize)> {
+/// A public function, method or associated function.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PublicFunction {
+    /// Its name, behind the name of its `impl` block's type if it has one: `Solutions::push`.
+    pub name: String,
+    /// The lines of its body, from the one with `{` to the one with `}`.
+    pub body: std::ops::RangeInclusive<usize>,
+}
+
+/// Every `pub fn` with its body.
+pub fn public_functions(tokens: &[Token]) -> Vec<PublicFunction> {
+    let text = |k: usize| tokens.get(k).map_or("", |token| token.text.as_str());
     let mut found = Vec::new();
-    for (k, token) in tokens.iter().enumerate() {
-        if token.text != "pub" || tokens.get(k + 1).is_none_or(|next| next.text == "(") {
+    // The type of the `impl` block around a token, with the token where the block ends.
+    let mut owner: Option<(String, usize)> = None;
+    for k in 0..tokens.len() {
+        if owner.as_ref().is_some_and(|&(_, end)| k > end) {
+            owner = None;
+        }
+        if text(k) == "impl"
+            && owner.is_none()
+            && let Some(open) = (k..tokens.len()).find(|&at| text(at) == "{")
+        {
+            let header: Vec<&str> = (k + 1..open).map(text).collect();
+            owner = Some((implementing_type(&header), closing(tokens, open)));
+        }
+        if text(k) != "pub" || text(k + 1) == "(" {
             continue;
         }
         let mut at = k + 1;
-        while tokens
-            .get(at)
-            .is_some_and(|next| ["const", "unsafe", "extern", "literal"].contains(&next.text.as_str()))
-        {
+        while ["const", "unsafe", "extern", "literal"].contains(&text(at)) {
             at += 1;
         }
-        if tokens.get(at).is_some_and(|next| next.text == "fn") {
-            found.push((tokens[at + 1].text.clone(), tokens[at + 1].line));
+        if text(at) != "fn" {
+            continue;
         }
+        let Some(open) = (at..tokens.len()).find(|&brace| text(brace) == "{") else { continue };
+        let name = match &owner {
+            Some((owner, _)) => format!("{owner}::{}", text(at + 1)),
+            None => text(at + 1).to_owned(),
+        };
+        found.push(PublicFunction { name, body: tokens[open].line..=tokens[closing(tokens, open)].line });
     }
     found
+}
+
+/// The position of the brace that closes the one at `open`.
+fn closing(tokens: &[Token], open: usize) -> usize {
+    let mut depth = 0;
+    for (k, token) in tokens.iter().enumerate().skip(open) {
+        match token.text.as_str() {
+            "{" => depth += 1,
+            "}" => depth -= 1,
+            _ => continue,
+        }
+        if depth == 0 {
+            return k;
+        }
+    }
+    tokens.len() - 1
+}
+
+/// `Foo` of `impl<T: Real> Foo<T>` and of `impl<T> Trait<T> for Foo<T>`.
+fn implementing_type(header: &[&str]) -> String {
+    let mut depth = 0i32;
+    let mut name = String::new();
+    for (k, text) in header.iter().enumerate() {
+        match *text {
+            "<" => depth += 1,
+            ">" if header[k - 1] != "-" => depth -= 1,
+            "where" => break,
+            _ if depth == 0 && text.starts_with(|c: char| c.is_alphabetic()) => name = (*text).to_owned(),
+            _ => {}
+        }
+    }
+    name
 }
