@@ -1,0 +1,63 @@
+//! One minimal problem a call: `int bench_<task>_<scalar>(const T* a, const T* b, T* out)`.
+
+use std::slice;
+
+use epipole::nalgebra::{Matrix3, Vector3};
+use epipole::{Real, solvers};
+
+/// The first `N` bearings of an array of rows.
+///
+/// # Safety
+/// `p` points to at least `3 N` scalars.
+unsafe fn bearings<T: Real, const N: usize>(p: *const T) -> [Vector3<T>; N] {
+    // SAFETY: as the caller promises.
+    let p = unsafe { slice::from_raw_parts(p, 3 * N) };
+    std::array::from_fn(|i| Vector3::new(p[3 * i], p[3 * i + 1], p[3 * i + 2]))
+}
+
+/// Writes matrices row-major, one after the other; how many there were.
+///
+/// # Safety
+/// `out` has room for all of them.
+unsafe fn put<T: Real>(out: *mut T, matrices: impl IntoIterator<Item = Matrix3<T>>) -> i32 {
+    let mut count = 0;
+    for m in matrices {
+        for (k, v) in m.transpose().iter().enumerate() {
+            // SAFETY: as the caller promises.
+            unsafe { *out.add(9 * count + k) = *v };
+        }
+        count += 1;
+    }
+    count as i32
+}
+
+/// Exports `body` for both scalars as `extern "C"` functions of `(a, b, out)`.
+macro_rules! export {
+    ($($f32:ident $f64:ident: $body:ident;)*) => {
+        $(
+            /// # Safety
+            /// The arrays are as long as the task's problem and its largest number of solutions.
+            #[unsafe(no_mangle)]
+            pub unsafe extern "C" fn $f32(a: *const f32, b: *const f32, out: *mut f32) -> i32 {
+                // SAFETY: as the caller promises.
+                unsafe { $body(a, b, out) }
+            }
+            /// # Safety
+            /// The arrays are as long as the task's problem and its largest number of solutions.
+            #[unsafe(no_mangle)]
+            pub unsafe extern "C" fn $f64(a: *const f64, b: *const f64, out: *mut f64) -> i32 {
+                // SAFETY: as the caller promises.
+                unsafe { $body(a, b, out) }
+            }
+        )*
+    };
+}
+
+export! {
+    bench_5pt_f32 bench_5pt_f64: relpose_5pt;
+}
+
+unsafe fn relpose_5pt<T: Real>(a: *const T, b: *const T, out: *mut T) -> i32 {
+    // SAFETY: five bearings each, at most ten solutions.
+    unsafe { put(out, solvers::relpose_5pt(&bearings(a), &bearings(b)).into_iter().map(|e| e.0)) }
+}
