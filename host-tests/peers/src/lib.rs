@@ -3,4 +3,4 @@
 //! A task `bench_<task>_<scalar>(a, b, out)` takes one problem, writes its solutions row-major one after the other and
 //! returns how many there are.
 
-mod solvers;
+pub mod solvers;
