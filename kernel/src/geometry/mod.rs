@@ -6,6 +6,7 @@ mod fundamental;
 mod homography;
 pub mod pose;
 pub mod residual;
+pub mod triangulation;
 
 pub use camera::{BrownConrady, Camera, CameraError, CameraModel, KannalaBrandt, Pinhole, UnprojectError};
 pub use essential::Essential;
