@@ -6,7 +6,7 @@ use super::{Triangulation, ViewPair, all_finite, parallel_sine};
 use crate::geometry::Pose;
 use crate::geometry::pose::{centre, tangent_basis};
 use crate::linalg::RowQr;
-use crate::real::{abs, from_u32, is_finite, max, sqrt};
+use crate::real::{abs, is_finite, max, sqrt};
 use crate::{InputError, Real};
 
 /// Newton steps on the characteristic polynomial at the most. Two are usual, noise-free one.
@@ -153,7 +153,7 @@ pub fn triangulate_dlt<T: Real>(
         return Err(InputError::TooFew { given: poses.len(), needed: 2 });
     };
     let origin = centre(first);
-    let mut scale = T::ZERO;
+    let (mut scale, mut views) = (T::ZERO, T::ZERO);
     for (index, (pose, bearing)) in poses.iter().zip(bearings).enumerate() {
         let mut numbers = pose.rotation.coords.iter().chain(pose.translation.vector.iter());
         if !numbers.all(|x| is_finite(*x)) {
@@ -164,6 +164,7 @@ pub fn triangulate_dlt<T: Real>(
         }
         let offset = centre(pose) - origin;
         scale = max(max(abs(offset.x), max(abs(offset.y), abs(offset.z))), scale);
+        views += T::ONE;
     }
     if !(scale >= T::MIN_POSITIVE && scale <= T::MAX) {
         return Ok(Triangulation::Undetermined);
@@ -183,7 +184,7 @@ pub fn triangulate_dlt<T: Real>(
             [b.x, b.y, b.z, -b.dot(&c)]
         }));
     }
-    let rounding = parallel_sine::<T>() * sqrt(from_u32::<T>(poses.len().min(1 << 20) as u32));
+    let rounding = parallel_sine::<T>() * sqrt(views);
     let Some(least) = qr.least_singular().filter(|least| least.next_value > rounding) else {
         return Ok(Triangulation::Undetermined);
     };
