@@ -8,6 +8,7 @@
 
 pub mod cases;
 pub mod matchers;
+pub mod oracle;
 pub mod rng;
 pub mod scenes;
 pub mod source;

@@ -4,7 +4,7 @@ use crate::real::{abs, lit};
 use crate::{Real, Solutions};
 
 /// Cells into which [-1, 1] is divided; one more on either side sees extrema at the ends.
-const CELLS: usize = 32;
+const CELLS: usize = 128;
 const SAMPLES: usize = CELLS + 3;
 
 /// The real roots of a polynomial of degree 10 on the whole projective line, as pairs `[p, q]` for the root `p / q`,
@@ -77,7 +77,7 @@ fn roots_in_chart<T: Real>(c: &[T; 11], f: &[T; SAMPLES], mut found: impl FnMut(
                 }
                 let step = d / (h + h);
                 let next = x - step;
-                x = if next > lo && next < hi { next } else { (lo + hi) * T::HALF };
+                x = if next >= lo && next <= hi { next } else { (lo + hi) * T::HALF };
             }
             let v = value(c, x);
             if x < -T::ONE || x >= T::ONE {
@@ -107,7 +107,7 @@ fn refine<T: Real>(c: &[T; 11], mut lo: T, mut hi: T, positive_at_lo: bool) -> T
             hi = x
         }
         let next = x - f / d;
-        x = if next > lo && next < hi { next } else { (lo + hi) * T::HALF };
+        x = if next >= lo && next <= hi { next } else { (lo + hi) * T::HALF };
     }
     x
 }
