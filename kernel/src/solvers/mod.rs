@@ -1,5 +1,7 @@
 //! Minimal and linear solvers, one a file.
 
+mod homography_4pt;
 mod relpose_5pt;
 
+pub use homography_4pt::homography_4pt;
 pub use relpose_5pt::{relpose_5pt, relpose_5pt_wide};
