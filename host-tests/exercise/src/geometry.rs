@@ -1,0 +1,157 @@
+//! `epipole::geometry`.
+
+use epipole::geometry::{
+    BrownConrady, Camera, CameraModel, Essential, KannalaBrandt, Pinhole, pose as p, residual,
+};
+use epipole::nalgebra::{Vector3, Vector6};
+use epipole::{Real, real::lit};
+
+use crate::{Sink, Source};
+
+pub(crate) fn pose<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
+    let (a, b) = (source.pose::<T>(), source.pose::<T>());
+    let moved = p::retract(&a, &Vector6::from(source.array::<T, 6>()));
+    sink.numbers(&moved.rotation.coords);
+    sink.numbers(&moved.translation.vector);
+    sink.numbers(&p::centre(&a));
+    sink.numbers(&p::relative(&a, &b).translation.vector);
+    sink.numbers(&p::from_parts(&source.rotation_matrix::<T>(), &source.vector3()).rotation.coords);
+    sink.numbers(&Essential::from_pose(&a).0);
+}
+
+pub(crate) fn rotations<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
+    let (w, v) = (source.vector3::<T>(), source.vector3::<T>());
+    let q = source.rotation::<T>();
+    sink.numbers(&p::exp(&w).coords);
+    sink.finite(&p::log(&q));
+    sink.numbers(&p::left_jacobian(&w));
+    sink.numbers(&p::skew(&w));
+    sink.numbers(&p::tangent_basis(&v));
+    sink.finite(&[p::rotation_angle(&q, &source.rotation())]);
+    sink.number(p::vector_angle(&w, &v));
+    sink.numbers(&p::quaternion_from_matrix(&source.rotation_matrix::<T>()).coords);
+    let nearest = p::nearest_rotation(&source.matrix::<T, 3, 3>());
+    sink.flag(nearest.is_some());
+    if let Some(nearest) = nearest {
+        sink.finite(&nearest);
+    }
+}
+
+/// A pinhole camera of ordinary parameters, now and then of any.
+fn camera<T: Real>(source: &mut Source<'_>) -> Option<Pinhole<T>> {
+    let [fx, fy, cx, cy] = source.array::<T, 4>();
+    let hundred = lit::<T>(100.0);
+    Pinhole::new(fx * hundred, fy * hundred, cx * hundred, cy * hundred).ok()
+}
+
+fn model<T: Real>(camera: &impl CameraModel<T>, source: &mut Source<'_>, sink: &mut Sink) {
+    sink.finite(&[camera.focal()]);
+    let point = source.vector3::<T>();
+    if let Some(pixel) = camera.project(&point) {
+        sink.finite(&pixel);
+    }
+    if let Some((pixel, jacobian)) = camera.project_with_jacobian(&point) {
+        sink.finite(&pixel);
+        sink.finite(&jacobian);
+    }
+    let pixel = source.vector2::<T>() * lit::<T>(100.0);
+    if let Ok(bearing) = camera.unproject(&pixel) {
+        sink.finite(&bearing);
+    }
+    if let Ok((bearing, jacobian)) = camera.unproject_with_jacobian(&pixel) {
+        sink.finite(&bearing);
+        sink.finite(&jacobian);
+    }
+    let pose = source.pose();
+    if let Some(r) = residual::reprojection(camera, &pose, &point, &pixel) {
+        sink.finite(&r);
+    }
+    if let Some(r) = residual::reprojection_with_jacobians(camera, &pose, &point, &pixel) {
+        sink.finite(&r.residual);
+        sink.finite(&r.by_pose);
+        sink.finite(&r.by_point);
+    }
+}
+
+pub(crate) fn pinhole<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
+    let Some(camera) = camera::<T>(source) else { return };
+    sink.finite(&[camera.fx(), camera.fy(), camera.cx(), camera.cy()]);
+    sink.finite(&camera.matrix());
+    sink.numbers(&camera.inverse_matrix());
+    if let Some(jacobian) = camera.intrinsics_jacobian(&source.vector3()) {
+        sink.finite(&jacobian);
+    }
+    model(&camera, source, sink);
+}
+
+pub(crate) fn brown_conrady<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
+    let Some(pinhole) = camera::<T>(source) else { return };
+    let scale = lit::<T>(0.1);
+    let Ok(camera) = BrownConrady::new(pinhole, source.array::<T, 5>().map(|k| k * scale)) else { return };
+    sink.finite(&camera.distortion());
+    sink.number(camera.max_radius());
+    sink.number(camera.pinhole().fx());
+    if let Some(jacobian) = camera.intrinsics_jacobian(&source.vector3()) {
+        sink.finite(&jacobian);
+    }
+    model(&camera, source, sink);
+}
+
+pub(crate) fn kannala_brandt<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
+    let Some(pinhole) = camera::<T>(source) else { return };
+    let scale = lit::<T>(0.1);
+    let Ok(camera) = KannalaBrandt::new(pinhole, source.array::<T, 4>().map(|k| k * scale)) else { return };
+    sink.finite(&camera.coefficients());
+    sink.number(camera.max_angle());
+    sink.number(camera.pinhole().fx());
+    if let Some(jacobian) = camera.intrinsics_jacobian(&source.vector3()) {
+        sink.finite(&jacobian);
+    }
+    model(&camera, source, sink);
+}
+
+pub(crate) fn any_camera<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
+    let Some(pinhole) = camera::<T>(source) else { return };
+    let camera = match source.below(3) {
+        0 => Camera::from(pinhole),
+        1 => match BrownConrady::new(pinhole, source.array()) {
+            Ok(camera) => camera.into(),
+            Err(_) => return,
+        },
+        _ => match KannalaBrandt::new(pinhole, source.array()) {
+            Ok(camera) => camera.into(),
+            Err(_) => return,
+        },
+    };
+    sink.number(camera.pinhole().fx());
+    model(&camera, source, sink);
+}
+
+pub(crate) fn residuals<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
+    let m = source.matrix::<T, 3, 3>();
+    let (x1, x2) = (source.vector2::<T>(), source.vector2::<T>());
+    let (b1, b2): (Vector3<T>, Vector3<T>) = (source.vector3(), source.vector3());
+    let (j1, j2) = (source.matrix::<T, 3, 2>(), source.matrix::<T, 3, 2>());
+    for r in [
+        residual::sampson_bearing(&m, &b1, &b2, &j1, &j2),
+        residual::sampson(&m, &x1, &x2),
+        residual::symmetric_epipolar_sq(&m, &x1, &x2),
+        residual::symmetric_transfer_sq(&m, &source.matrix(), &x1, &x2),
+    ]
+    .into_iter()
+    .flatten()
+    {
+        sink.finite(&[r]);
+    }
+    if let Some((r, jacobian)) = residual::sampson_with_jacobian(&m, &x1, &x2) {
+        sink.finite(&[r]);
+        sink.finite(&jacobian);
+    }
+    if let Some(r) = residual::transfer(&m, &x1, &x2) {
+        sink.finite(&r);
+    }
+    if let Some((r, jacobian)) = residual::transfer_with_jacobian(&m, &x1, &x2) {
+        sink.finite(&r);
+        sink.finite(&jacobian);
+    }
+}
