@@ -1,7 +1,10 @@
 //! `epipole::geometry`.
 
+use epipole::geometry::triangulation::{
+    Triangulation, View, ViewPair, depth_sigma, point_covariance, refine_point, triangulate_dlt,
+};
 use epipole::geometry::{
-    BrownConrady, Camera, CameraModel, Essential, KannalaBrandt, Pinhole, pose as p, residual,
+    BrownConrady, Camera, CameraModel, Essential, KannalaBrandt, Pinhole, Pose, pose as p, residual,
 };
 use epipole::nalgebra::{Vector3, Vector6};
 use epipole::{Real, real::lit};
@@ -153,5 +156,75 @@ pub(crate) fn residuals<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
     if let Some((r, jacobian)) = residual::transfer_with_jacobian(&m, &x1, &x2) {
         sink.finite(&r);
         sink.finite(&jacobian);
+    }
+}
+
+fn triangulated<T: Real>(answer: Triangulation<T>, sink: &mut Sink) -> Option<Vector3<T>> {
+    match answer {
+        Triangulation::Point(point) => sink.finite(&point),
+        Triangulation::Behind { point, view, count } => {
+            sink.finite(&point);
+            sink.count(view);
+            sink.count(count);
+        }
+        Triangulation::AtInfinity { direction } => sink.finite(&direction),
+        Triangulation::Undetermined => sink.flag(false),
+    }
+    answer.point()
+}
+
+pub(crate) fn two_view_triangulation<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
+    let views = match source.below(2) {
+        0 => ViewPair::new(&source.pose::<T>()),
+        _ => ViewPair::from_parts(&source.rotation_matrix(), &source.vector3()),
+    };
+    sink.numbers(&views.centre());
+    let (x1, x2) = (source.vector3::<T>(), source.vector3::<T>());
+    let (j1, j2) = (source.matrix::<T, 3, 2>(), source.matrix::<T, 3, 2>());
+    for answer in [
+        views.triangulate_midpoint(&x1, &x2),
+        views.triangulate_dlt(&x1, &x2),
+        views.triangulate_optimal(&x1, &x2),
+        views.triangulate_optimal_bearings(&x1, &x2, &j1, &j2),
+    ] {
+        if let Some(point) = triangulated(answer, sink) {
+            sink.number(views.parallax(&point));
+            if let Some(covariance) = views.covariance(&point, source.positive()) {
+                sink.finite(&covariance);
+                sink.number(depth_sigma(&covariance, &x1));
+            }
+        }
+    }
+}
+
+pub(crate) fn many_view_triangulation<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
+    let poses: [Pose<T>; 5] = core::array::from_fn(|_| source.pose());
+    let bearings = source.vectors::<T, 5>();
+    let pixels: [_; 5] = core::array::from_fn(|_| source.vector2::<T>());
+    let n = source.below(6);
+    let (Some(poses), Some(bearings), Some(pixels)) = (poses.get(..n), bearings.get(..n), pixels.get(..n))
+    else {
+        return;
+    };
+    let start = match triangulate_dlt(poses, bearings) {
+        Ok(answer) => triangulated(answer, sink),
+        Err(_) => None,
+    };
+    let Some(camera) = camera::<T>(source) else { return };
+    let views: [_; 5] = core::array::from_fn(|k| View {
+        camera: &camera,
+        pose: poses.get(k).copied().unwrap_or_else(Pose::identity),
+    });
+    let refined = refine_point(views.get(..n).unwrap_or(&[]), pixels, &start.unwrap_or_else(Vector3::zeros));
+    sink.flag(refined.is_ok());
+    if let Ok(refined) = refined {
+        sink.finite(&refined.point);
+        sink.finite(&[refined.cost_px_sq]);
+        sink.finite(refined.covariance_per_px_sq.iter().flatten());
+        sink.count(refined.evaluations as usize);
+    }
+    let jacobians = [source.matrix::<T, 2, 3>(), source.matrix()];
+    if let Some(covariance) = point_covariance(&jacobians, source.positive()) {
+        sink.finite(&covariance);
     }
 }

@@ -106,7 +106,7 @@ impl<T: Real, const N: usize> RowQr<T, N> {
     /// smallest singular value each time, and the smaller Ritz value of the plane is taken.
     ///
     /// # Returns
-    /// `None` where `r` is zero or not finite. Compare `value` and `next_value` to judge the rank.
+    /// `None` where `r` is zero, not finite, or so large that its squares are not. Compare `value` and `next_value` to judge the rank.
     ///
     /// # Cost
     /// Four iterations of four triangular solves.
@@ -184,7 +184,12 @@ impl<T: Real, const N: usize> RowQr<T, N> {
         }
         let value = [self.stretch(&vectors[0]), self.stretch(&vectors[1])];
         let least = if value[0] <= value[1] { 0 } else { 1 };
-        Some(LeastSingular { vector: vectors[least], value: value[least], next_value: value[1 - least] })
+        let finite = is_finite(value[0]) && is_finite(value[1]);
+        finite.then_some(LeastSingular {
+            vector: vectors[least],
+            value: value[least],
+            next_value: value[1 - least],
+        })
     }
 
     /// `|R x|`
