@@ -1,6 +1,8 @@
 //! SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014): a seed is a problem.
 
+use epipole::Real;
 use epipole::nalgebra::{Unit, UnitQuaternion, Vector3};
+use epipole::real::lit;
 
 /// A seeded stream of random numbers.
 #[derive(Clone, Debug)]
@@ -67,5 +69,23 @@ impl Rng {
             order.swap(k, self.index(k + 1));
         }
         order
+    }
+
+    /// Any number that the scalar holds: raw bits, moderate magnitudes, zeros, subnormals, the largest, infinities, NaN.
+    pub fn any_bits<T: Real>(&mut self) -> T {
+        let special = [0.0, -0.0, 1.0, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
+        match self.index(10) {
+            0..4 if size_of::<T>() == 4 => lit(f64::from(f32::from_bits(self.next_u64() as u32))),
+            0..4 => lit(f64::from_bits(self.next_u64())),
+            4..6 => lit(self.normal() * 2f64.powi(self.index(81) as i32 - 40)),
+            6..8 => lit(self.normal()),
+            8 => [T::MAX, -T::MAX, T::MIN_POSITIVE, T::MIN_POSITIVE * T::HALF, T::EPSILON][self.index(5)],
+            _ => lit(special[self.index(special.len())]),
+        }
+    }
+
+    /// Three of [`any_bits`](Self::any_bits).
+    pub fn any_vector<T: Real>(&mut self) -> Vector3<T> {
+        Vector3::new(self.any_bits(), self.any_bits(), self.any_bits())
     }
 }

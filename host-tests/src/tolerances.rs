@@ -43,4 +43,17 @@ table! {
     EPIPOLAR_RESIDUAL: 2e-5, 1e-11,
         "x2' E x1 of unit-norm E and bearings on the minimal sample; the sample's null space is exact to rounding, \
          the solver's root moves it by its own error";
+    PROJECTION_PX: 5e-4, 1e-10,
+        "pixels of 10^3; a division, a polynomial of degree 9 at most and a product, relative error a few EPSILON";
+    UNPROJECTION: 4e-6, 1e-14,
+        "radians; the rounding of a pixel of 10^3 over the focal length, and of the inverse of the distortion";
+    UNPROJECTION_FOLD: 2e-3, 1e-9,
+        "radians; as UNPROJECTION, over a slope of the distortion down to 1/30 of the slope in the centre";
+    JACOBIAN: 2e-5, 1e-7,
+        "relative to the largest entry; f64: central differences with a step of the cube root of EPSILON";
+    TRIANGULATED: 5e-4, 1e-9,
+        "relative distance of noise-free points at a parallax above 0.01 rad; EPSILON over the parallax, for f32 of \
+         inputs rounded before";
+    NEAREST_POINT: 1e-5, 1e-11,
+        "relative distance of two ways to compute the same point at a parallax above 0.01 rad";
 }

@@ -53,8 +53,7 @@ pub fn sampson_bearing<T: Real>(
     let line2 = m * x1;
     let gradient1 = (m * j1).tr_mul(x2);
     let gradient2 = j2.tr_mul(&line2);
-    let r = x2.dot(&line2) / sqrt(gradient1.norm_squared() + gradient2.norm_squared());
-    is_finite(r).then_some(r)
+    over_gradient(x2.dot(&line2), gradient1.norm_squared() + gradient2.norm_squared())
 }
 
 /// The Sampson distance of plane points `x = (x, y, 1)`, signed, in their unit:
@@ -76,8 +75,7 @@ pub fn sampson_bearing<T: Real>(
 #[must_use]
 pub fn sampson<T: Real>(m: &Matrix3<T>, x1: &Vector2<T>, x2: &Vector2<T>) -> Option<T> {
     let e = Epipolar::new(m, x1, x2);
-    let r = e.constraint / sqrt(e.gradient_sq());
-    is_finite(r).then_some(r)
+    over_gradient(e.constraint, e.gradient_sq())
 }
 
 /// [`sampson`], and its Jacobian by the entries of `M`, arranged as `M`.
@@ -88,8 +86,8 @@ pub fn sampson_with_jacobian<T: Real>(
     x2: &Vector2<T>,
 ) -> Option<(T, Matrix3<T>)> {
     let e = Epipolar::new(m, x1, x2);
+    let r = over_gradient(e.constraint, e.gradient_sq())?;
     let inverse = T::ONE / sqrt(e.gradient_sq());
-    let r = e.constraint * inverse;
     // r = c / sqrt(d): dr = (dc - r/sqrt(d) dd/2) / sqrt(d)
     let (h1, h2) = (x1.push(T::ONE), x2.push(T::ONE));
     let half_gradient = Vector3::new(e.line2.x, e.line2.y, T::ZERO) * h1.transpose()
@@ -109,10 +107,17 @@ pub fn sampson_with_jacobian<T: Real>(
 #[must_use]
 pub fn symmetric_epipolar_sq<T: Real>(m: &Matrix3<T>, x1: &Vector2<T>, x2: &Vector2<T>) -> Option<T> {
     let e = Epipolar::new(m, x1, x2);
-    let distance = |line: &Vector3<T>| e.constraint / sqrt(line.x * line.x + line.y * line.y);
-    let (d1, d2) = (distance(&e.line1), distance(&e.line2));
+    let distance = |line: &Vector3<T>| over_gradient(e.constraint, line.x * line.x + line.y * line.y);
+    let (d1, d2) = (distance(&e.line1)?, distance(&e.line2)?);
     let sum = d1 * d1 + d2 * d2;
     is_finite(sum).then_some(sum)
+}
+
+/// The constraint over the length of its gradient. A gradient whose square overflows must not pass for a residual of 0.
+#[inline]
+fn over_gradient<T: Real>(constraint: T, gradient_sq: T) -> Option<T> {
+    let r = constraint / sqrt(gradient_sq);
+    (is_finite(r) && is_finite(gradient_sq)).then_some(r)
 }
 
 /// The epipolar lines of a correspondence and the value of the constraint.
@@ -155,7 +160,7 @@ impl<T: Real> Epipolar<T> {
 pub fn transfer<T: Real>(h: &Matrix3<T>, x1: &Vector2<T>, x2: &Vector2<T>) -> Option<Vector2<T>> {
     let y = h * x1.push(T::ONE);
     let error = Vector2::new(y.x / y.z, y.y / y.z) - x2;
-    (is_finite(error.x) && is_finite(error.y)).then_some(error)
+    (is_finite(error.x) && is_finite(error.y) && is_finite(y.z)).then_some(error)
 }
 
 /// [`transfer`], and its Jacobian by the entries of `H`, row by row: `h11 h12 h13 h21 .. h33`.
