@@ -1,6 +1,7 @@
 //! Cameras, poses and the relations between two views.
 
 pub mod camera;
+pub mod cheirality;
 mod essential;
 mod fundamental;
 mod homography;
@@ -9,7 +10,7 @@ pub mod residual;
 pub mod triangulation;
 
 pub use camera::{BrownConrady, Camera, CameraError, CameraModel, KannalaBrandt, Pinhole, UnprojectError};
-pub use essential::Essential;
+pub use essential::{CheiralPose, Essential, TwistedPair};
 pub use fundamental::Fundamental;
 pub use homography::Homography;
 pub use pose::Pose;

@@ -4,4 +4,4 @@ mod homography_4pt;
 mod relpose_5pt;
 
 pub use homography_4pt::homography_4pt;
-pub use relpose_5pt::{relpose_5pt, relpose_5pt_wide};
+pub use relpose_5pt::{relpose_5pt, relpose_5pt_poses, relpose_5pt_wide};

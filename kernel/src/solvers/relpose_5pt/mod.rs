@@ -6,7 +6,7 @@ mod polish;
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::geometry::Essential;
+use crate::geometry::{Essential, Pose};
 use crate::linalg::null_space;
 use crate::linalg::poly::projective_roots_10;
 use crate::{Real, Solutions};
@@ -46,6 +46,34 @@ pub fn relpose_5pt<T: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) -> Solut
 /// [`relpose_5pt`] with the polynomial of degree 10 and its roots in `f64`, for a core with a double-precision unit.
 pub fn relpose_5pt_wide(x1: &[Vector3<f32>; 5], x2: &[Vector3<f32>; 5]) -> Solutions<Essential<f32>, 10> {
     solve::<f32, f64>(x1, x2)
+}
+
+/// The poses of view 2 in the frame of view 1 that five bearing pairs allow with all five points in front of both
+/// cameras: [`relpose_5pt`], then the choice among the four poses of each essential matrix.
+///
+/// `X2 = R X1 + t`, `|t| = 1`.
+///
+/// # Returns
+/// 0 to 10 poses, at most one of each essential matrix, in the order of [`relpose_5pt`].
+///
+/// # Examples
+/// ```
+/// use epipole::geometry::Pose;
+/// use epipole::nalgebra::{Point3, UnitQuaternion, Vector3};
+/// let truth = Pose::from_parts(Vector3::new(0.6, 0.0, 0.8).into(), UnitQuaternion::from_euler_angles(0.1_f64, 0.2, 0.3));
+/// let x1 = [[-1.0, 0.5, 4.0], [1.0, 1.0, 5.0], [0.0, -1.0, 6.0], [-0.5, -0.3, 3.0], [1.0, -0.7, 7.0]].map(Vector3::from);
+/// let x2 = x1.map(|x| (truth * Point3::from(x)).coords);
+/// let poses = epipole::solvers::relpose_5pt_poses(&x1, &x2);
+/// assert!(poses.iter().any(|p| (p.to_homogeneous() - truth.to_homogeneous()).norm() < 1e-12));
+/// ```
+pub fn relpose_5pt_poses<T: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) -> Solutions<Pose<T>, 10> {
+    let mut poses = Solutions::new();
+    for e in &relpose_5pt(x1, x2) {
+        if let Some(pose) = e.twisted_pair().and_then(|pair| pair.pose_with_all_in_front(x1, x2)) {
+            poses.push(pose);
+        }
+    }
+    poses
 }
 
 #[inline]
