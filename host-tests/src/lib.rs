@@ -17,3 +17,8 @@ pub mod tolerances;
 pub use cases::{Share, for_each_case, share_of};
 pub use rng::Rng;
 pub use scenes::{AbsoluteScene, Motion, Scene, Shape, TwoView};
+
+/// The README's examples, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+pub struct Readme;
