@@ -5,9 +5,12 @@
 
 pub use nalgebra;
 
+pub mod estimate;
 pub mod geometry;
 pub mod linalg;
 pub mod real;
+pub mod refine;
+pub mod robust;
 pub mod solvers;
 
 mod error;

@@ -249,4 +249,8 @@ impl<T: Real> CameraModel<T> for BrownConrady<T> {
     fn focal(&self) -> T {
         self.pinhole.focal()
     }
+
+    fn rectilinear(&self) -> Option<(T, T)> {
+        self.pinhole.rectilinear()
+    }
 }

@@ -58,6 +58,13 @@ pub trait CameraModel<T: Real> {
     /// The mean focal length in pixels: pixels per radian at the principal point.
     #[must_use]
     fn focal(&self) -> T;
+
+    /// The focal lengths `(fx, fy)` in pixels of a lens whose image is, but for distortion, that of the plane z = 1:
+    /// estimators then work on that plane. None for a fisheye, whose bearings may leave it.
+    #[must_use]
+    fn rectilinear(&self) -> Option<(T, T)> {
+        None
+    }
 }
 
 /// Any of the camera models, by value.
@@ -121,6 +128,9 @@ impl<T: Real> CameraModel<T> for Camera<T> {
     }
     fn focal(&self) -> T {
         delegate!(self, camera => camera.focal())
+    }
+    fn rectilinear(&self) -> Option<(T, T)> {
+        delegate!(self, camera => camera.rectilinear())
     }
 }
 

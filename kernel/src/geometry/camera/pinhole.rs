@@ -165,4 +165,8 @@ impl<T: Real> CameraModel<T> for Pinhole<T> {
     fn focal(&self) -> T {
         self.fx * T::HALF + self.fy * T::HALF
     }
+
+    fn rectilinear(&self) -> Option<(T, T)> {
+        Some((self.fx, self.fy))
+    }
 }

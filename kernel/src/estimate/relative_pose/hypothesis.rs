@@ -1,0 +1,282 @@
+//! Relative pose as the engine's problem: five-point hypotheses gated by cheirality, Sampson scores, refinement.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::Real;
+use crate::geometry::Essential;
+use crate::real::{abs, lit, sqrt};
+use crate::refine::blocks::{BlockSlice, EpipolarBlock, in_front};
+use crate::refine::lm::{Manifold, minimise};
+use crate::refine::relative_pose::{PoseModel, Scales};
+use crate::robust::{Estimator, Gate, LANES, Lanes, Loss, Score, ScoreCounts, Tally};
+use crate::solvers::relpose_5pt;
+
+/// Correspondences and what a score of them needs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PoseProblem<'a, T, B> {
+    pub(super) data: BlockSlice<'a, B>,
+    pub(super) scales: Scales<T>,
+    /// The threshold in the blocks' unit.
+    pub(super) threshold: T,
+    /// Blocks between two that are scored one after the other.
+    pub(super) stride: usize,
+}
+
+/// Blocks scored between two looks at the gate.
+const CHUNK: usize = 2;
+/// Passes over the data in one local optimisation.
+const LOCAL_PASSES: u32 = 10;
+/// Rays closer to parallel than this many thresholds say nothing about depth.
+const PARALLEL: f64 = 1.0;
+
+impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
+    pub(super) fn new(data: BlockSlice<'a, B>, scales: Scales<T>, threshold: T) -> Self {
+        Self { data, scales, threshold, stride: stride(data.blocks.len()) }
+    }
+
+    /// The normalised points or bearings of a correspondence; none where it is not finite.
+    #[inline]
+    pub(super) fn directions(&self, index: u32) -> Option<(Vector3<T>, Vector3<T>)> {
+        let block = self.data.blocks.get(index as usize / LANES)?;
+        let (f1, f2) = block.directions();
+        let lane = index as usize % LANES;
+        let (a, b) = (self.scales.inverse1(), self.scales.inverse2());
+        let pick = |f: &[Lanes<T>; 3], s: [T; 2]| {
+            Some(Vector3::new(*f[0].get(lane)? * s[0], *f[1].get(lane)? * s[1], *f[2].get(lane)?))
+        };
+        Some((pick(&f1, a)?, pick(&f2, b)?))
+    }
+
+    /// Squared residuals of a block in units of the squared threshold.
+    #[inline(always)]
+    fn squared(&self, block: &B, f: &Matrix3<T>, scale: T) -> Lanes<T> {
+        let (c, d) = block.residual(f);
+        let mut squared = [T::ZERO; LANES];
+        for l in 0..LANES {
+            squared[l] = c[l] * c[l] * scale / d[l];
+        }
+        squared
+    }
+
+    /// The squared sine below which rays are parallel.
+    fn parallel_sq(&self) -> T {
+        let s = self.threshold * lit(PARALLEL);
+        s * s
+    }
+
+    /// Squared residuals of a block in units of the squared threshold; of a point behind a camera, 1.
+    #[inline(always)]
+    fn squared_in_front(&self, block: &B, model: &PoseModel<T>, view: &View<T>) -> Lanes<T> {
+        let mut squared = self.squared(block, &view.matrix, view.scale);
+        if squared[0] < T::ONE || squared[1] < T::ONE || squared[2] < T::ONE || squared[3] < T::ONE {
+            let (mut f1, mut f2) = block.directions();
+            for l in 0..LANES {
+                f1[0][l] *= view.inverse1[0];
+                f1[1][l] *= view.inverse1[1];
+                f2[0][l] *= view.inverse2[0];
+                f2[1][l] *= view.inverse2[1];
+            }
+            let front = in_front(&f1, &f2, &model.rotation, &model.translation, view.parallel_sq);
+            for l in 0..LANES {
+                squared[l] = if front[l] { squared[l] } else { T::ONE };
+            }
+        }
+        squared
+    }
+
+    fn view(&self, model: &PoseModel<T>) -> View<T> {
+        View {
+            matrix: model.matrix(),
+            scale: T::ONE / (self.threshold * self.threshold),
+            inverse1: self.scales.inverse1(),
+            inverse2: self.scales.inverse2(),
+            parallel_sq: self.parallel_sq(),
+        }
+    }
+
+    /// Calls `each` with the squared residuals of every block in order, in units of the squared threshold, points
+    /// behind a camera at 1 or more, and how many lanes count.
+    pub(super) fn for_each_block(&self, model: &PoseModel<T>, mut each: impl FnMut(&B, &Lanes<T>, usize)) {
+        let view = self.view(model);
+        let mut left = self.data.count;
+        for block in self.data.blocks {
+            each(block, &self.squared_in_front(block, model, &view), left.min(LANES));
+            left = left.saturating_sub(LANES);
+        }
+    }
+
+    /// The model that minimises the truncated loss at `threshold` times `factor`, from `model`.
+    pub(super) fn optimise(
+        &self,
+        model: &PoseModel<T>,
+        loss: &Loss<T>,
+        passes: u32,
+        tolerance: T,
+    ) -> crate::refine::lm::Minimum<PoseModel<T>, T, 5> {
+        minimise(self.data, model, loss, passes, tolerance)
+    }
+}
+
+/// What is computed once a model.
+struct View<T: Real> {
+    matrix: Matrix3<T>,
+    scale: T,
+    inverse1: [T; 2],
+    inverse2: [T; 2],
+    parallel_sq: T,
+}
+
+/// A stride near the golden ratio of `blocks` and coprime to it: steps of it visit every block once, and early ones
+/// are spread over the whole list, so that an order in the input (best match first) does not mislead the early exit.
+fn stride(blocks: usize) -> usize {
+    let first = blocks * 5 / 8;
+    (first..first + 64).find(|&stride| gcd(stride, blocks) == 1).unwrap_or(1)
+}
+
+fn gcd(mut a: usize, mut b: usize) -> usize {
+    for _ in 0..128 {
+        if b == 0 {
+            break;
+        }
+        (a, b) = (b, a % b);
+    }
+    a
+}
+
+impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
+    type Model = PoseModel<T>;
+
+    fn count(&self) -> u32 {
+        self.data.count as u32
+    }
+
+    fn generate(&self, sample: &[u32; 5], found: &mut impl FnMut(&PoseModel<T>)) -> bool {
+        let mut f1 = [Vector3::zeros(); 5];
+        let mut f2 = [Vector3::zeros(); 5];
+        for ((a, b), &index) in f1.iter_mut().zip(&mut f2).zip(sample) {
+            let Some((x, y)) = self.directions(index) else { return false };
+            (*a, *b) = (x, y);
+        }
+        if repeated(&f1, self.threshold) || repeated(&f2, self.threshold) {
+            return false;
+        }
+        for essential in &relpose_5pt(&f1, &f2) {
+            if let Some((rotation, translation)) = pose_in_front(essential, &f1, &f2) {
+                found(&PoseModel { rotation, translation, scales: self.scales });
+            }
+        }
+        true
+    }
+
+    fn score(&self, model: &PoseModel<T>, gate: &Gate<T>, counts: &mut ScoreCounts) -> Option<Score<T>> {
+        let blocks = self.data.blocks;
+        let view = self.view(model);
+        let mut tally = Tally::new();
+        let mut at = 0usize;
+        let mut seen = 0u32;
+        // The last block may not be full; it is left to the full pass.
+        let full = self.data.count / LANES;
+        for _ in 0..full.div_ceil(CHUNK) {
+            for _ in 0..CHUNK {
+                if at < full
+                    && let Some(block) = blocks.get(at)
+                {
+                    tally.add(&self.squared(block, &view.matrix, view.scale));
+                    seen += LANES as u32;
+                }
+                at += self.stride;
+                if at >= blocks.len() {
+                    at -= blocks.len();
+                }
+            }
+            if gate.rejects(tally.cost(), tally.inliers(), crate::real::from_u32(seen)) {
+                counts.residuals += seen as u64;
+                counts.rejected_residuals += seen as u64;
+                counts.rejected_inliers += tally.inliers().to_f64() as u64;
+                return None;
+            }
+        }
+        counts.residuals += seen as u64 + self.data.count as u64;
+        let mut tally = Tally::new();
+        self.for_each_block(model, |_, squared, filled| tally.add_first(squared, filled));
+        Some(tally.score())
+    }
+
+    fn refine(&self, model: &PoseModel<T>, residuals: &mut u64) -> Option<PoseModel<T>> {
+        let loss = Loss::Truncated(self.threshold);
+        let minimum = self.optimise(model, &loss, LOCAL_PASSES, lit(1e-4));
+        *residuals += minimum.passes as u64 * self.data.count as u64;
+        Some(minimum.model)
+    }
+}
+
+/// True where two of a sample's points are closer than `distance` in a view: then they say the same thing twice, or
+/// one of them is wrong.
+fn repeated<T: Real>(points: &[Vector3<T>; 5], distance: T) -> bool {
+    let limit = distance * distance;
+    for i in 1..5 {
+        for j in 0..i {
+            // Written so that a NaN counts as repeated.
+            if !((points[i] - points[j]).norm_squared() > limit) {
+                return true;
+            }
+        }
+    }
+    false
+}
+
+/// The one pose of an essential matrix for which all five points lie in front of both cameras; none where there is
+/// none. Horn's closed form, without a singular value decomposition.
+///
+/// # References
+/// B. K. P. Horn, "Recovering baseline and orientation from essential matrix", 1990.
+fn pose_in_front<T: Real>(
+    essential: &Essential<T>,
+    f1: &[Vector3<T>; 5],
+    f2: &[Vector3<T>; 5],
+) -> Option<(Matrix3<T>, Vector3<T>)> {
+    let e = &essential.0;
+    let columns = [e.column(0).into_owned(), e.column(1).into_owned(), e.column(2).into_owned()];
+    let products =
+        [columns[1].cross(&columns[2]), columns[2].cross(&columns[0]), columns[0].cross(&columns[1])];
+    // t is orthogonal to every column: the longest of their cross products.
+    let lengths = products.map(|p| p.norm_squared());
+    let (mut t, mut longest) = (products[0], lengths[0]);
+    for k in 1..3 {
+        if lengths[k] > longest {
+            (t, longest) = (products[k], lengths[k]);
+        }
+    }
+    let size = e.norm_squared() * T::HALF;
+    if !(longest > T::ZERO && size > T::ZERO) {
+        return None;
+    }
+    t *= T::ONE / sqrt(longest);
+    // With |t| = 1 and E scaled to |E|^2 = 2: R = cof(E) - [t]x E, or with -t.
+    let scale = T::ONE / sqrt(size);
+    let cofactors = Matrix3::from_columns(&products) * (scale * scale);
+    let turned =
+        Matrix3::from_columns(&[t.cross(&columns[0]), t.cross(&columns[1]), t.cross(&columns[2])]) * scale;
+    for rotation in [cofactors - turned, cofactors + turned] {
+        let mut sign = T::ZERO;
+        let mut consistent = true;
+        for (x1, x2) in f1.iter().zip(f2) {
+            let a = rotation * x1;
+            let (aa, bb, ab) = (a.norm_squared(), x2.norm_squared(), a.dot(x2));
+            let (ta, tb) = (t.dot(&a), t.dot(x2));
+            let (depth1, depth2) = (ab * tb - bb * ta, aa * tb - ab * ta);
+            if !(depth1 * depth2 > T::ZERO && depth1 * sign >= T::ZERO) {
+                consistent = false;
+                break;
+            }
+            sign = depth1;
+        }
+        if consistent {
+            let t = if sign < T::ZERO { -t } else { t };
+            // A matrix that is not close to essential gives no rotation.
+            let off = abs(rotation.norm_squared() - lit(3.0));
+            return (off < lit(0.1)).then_some((rotation, t));
+        }
+    }
+    None
+}

@@ -1,0 +1,201 @@
+//! The relative pose of two calibrated views.
+
+use core::fmt;
+
+use nalgebra::Vector2;
+
+use super::load::{Units, check_pixels, load_bearings, load_planes};
+use super::workspace::RelativePoseWorkspace;
+use crate::geometry::CameraModel;
+use crate::linalg::Ldlt;
+use crate::real::{from_u32, lit, max, sqrt};
+use crate::refine::blocks::{BearingBlock, BlockSlice, EpipolarBlock, PlaneBlock};
+use crate::robust::budget::check_noise;
+use crate::robust::{Guide, LANES, Loss, OptionsError, RansacOptions, rank_by_score, ransac};
+use crate::{InputError, Real};
+
+mod hypothesis;
+mod verdict;
+
+use hypothesis::PoseProblem;
+pub use verdict::{
+    GeneralMotion, PlanarPose, PureRotation, RelativePoseEstimate, RelativePoseVerdict, Unobservable,
+};
+
+/// Options of [`relative_pose`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct RelativePoseOptions<T> {
+    /// Largest Sampson error of an inlier, pixels. Default 1.
+    pub max_error_px: T,
+    /// Standard deviation of the noise of one image coordinate, pixels. Default: half of `max_error_px`.
+    pub sigma_px: Option<T>,
+    /// Confidence, iterations, budgets and seed.
+    pub ransac: RansacOptions<T>,
+}
+
+impl<T: Real> Default for RelativePoseOptions<T> {
+    fn default() -> Self {
+        Self { max_error_px: T::ONE, sigma_px: None, ransac: RansacOptions::default() }
+    }
+}
+
+/// Malformed input or options. Outputs are untouched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum RelativePoseError {
+    /// The correspondences cannot be used.
+    Input(InputError),
+    /// An option is out of its range.
+    Options(OptionsError),
+}
+
+impl fmt::Display for RelativePoseError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Input(error) => error.fmt(f),
+            Self::Options(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for RelativePoseError {}
+
+impl From<InputError> for RelativePoseError {
+    fn from(error: InputError) -> Self {
+        Self::Input(error)
+    }
+}
+
+impl From<OptionsError> for RelativePoseError {
+    fn from(error: OptionsError) -> Self {
+        Self::Options(error)
+    }
+}
+
+/// The pose of view 2 in the frame of view 1 from pixel correspondences, many of which may be wrong, or why there is
+/// none.
+///
+/// # Examples
+/// ```
+/// use epipole::estimate::{RelativePoseOptions, RelativePoseStorage, relative_pose};
+/// use epipole::geometry::{CameraModel, Pinhole, Pose};
+/// use epipole::nalgebra::{Point3, Vector2, Vector3};
+///
+/// let camera = Pinhole::new(500.0, 500.0, 320.0, 240.0).unwrap();
+/// let truth = Pose::new(Vector3::new(-1.0, 0.0, 0.0), Vector3::new(0.0, 0.1, 0.0));
+/// let (mut x1, mut x2) = ([Vector2::zeros(); 60], [Vector2::zeros(); 60]);
+/// for k in 0..60 {
+///     let i = k as f64;
+///     let point = Point3::new((1.7 * i).sin() * 2.0, (2.3 * i).cos(), 5.0 + 2.0 * (0.9 * i).sin());
+///     x1[k] = camera.project(&point.coords).unwrap();
+///     x2[k] = camera.project(&(truth * point).coords).unwrap();
+///     if k % 3 == 0 {
+///         x2[k] = Vector2::new((i * 77.0) % 640.0, (i * 31.0) % 480.0); // A wrong match.
+///     }
+/// }
+/// let mut storage = RelativePoseStorage::<f64, 60>::new();
+/// let mut workspace = storage.workspace();
+/// let estimate =
+///     relative_pose(&camera, &camera, &x1, &x2, &RelativePoseOptions::default(), &mut workspace).unwrap();
+/// let pose = estimate.pose().unwrap();
+/// assert!(pose.rotation.angle_to(&truth.rotation) < 1e-6);
+/// assert!((pose.translation.vector - truth.translation.vector).norm() < 1e-6);
+/// assert!(!workspace.inliers()[0] && workspace.inliers()[1]);
+/// ```
+pub fn relative_pose<T: Real>(
+    camera1: &impl CameraModel<T>,
+    camera2: &impl CameraModel<T>,
+    x1: &[Vector2<T>],
+    x2: &[Vector2<T>],
+    options: &RelativePoseOptions<T>,
+    workspace: &mut RelativePoseWorkspace<'_, T>,
+) -> Result<RelativePoseEstimate<T>, RelativePoseError> {
+    relative_pose_guided(camera1, camera2, x1, x2, options, Guide::none(), workspace)
+}
+
+/// [`relative_pose`], with match scores for ordered sampling, or with a caller's "may I go on?".
+pub fn relative_pose_guided<T: Real>(
+    camera1: &impl CameraModel<T>,
+    camera2: &impl CameraModel<T>,
+    x1: &[Vector2<T>],
+    x2: &[Vector2<T>],
+    options: &RelativePoseOptions<T>,
+    guide: Guide<'_, T>,
+    workspace: &mut RelativePoseWorkspace<'_, T>,
+) -> Result<RelativePoseEstimate<T>, RelativePoseError> {
+    check_noise(options.max_error_px, options.sigma_px)?;
+    options.ransac.check()?;
+    let planes = camera1.rectilinear().zip(camera2.rectilinear());
+    let capacity = match planes {
+        Some(_) => workspace.capacity_of::<PlaneBlock<T>>(),
+        None => workspace.capacity_of::<BearingBlock<T>>(),
+    };
+    check_pixels(x1, x2, 5, capacity)?;
+    if let Some(scores) = guide.scores
+        && scores.len() != x1.len()
+    {
+        return Err(InputError::LengthMismatch { first: x1.len(), second: scores.len() }.into());
+    }
+    workspace.count = x1.len();
+    Ok(match planes {
+        Some((a, b)) => {
+            let units = load_planes(camera1, camera2, [a, b], x1, x2, workspace);
+            estimate::<T, PlaneBlock<T>>(units, options, guide, workspace)
+        }
+        None => {
+            let units = load_bearings(camera1, camera2, x1, x2, workspace);
+            estimate::<T, BearingBlock<T>>(units, options, guide, workspace)
+        }
+    })
+}
+
+/// The verdict on loaded correspondences.
+fn estimate<T: Real, B: EpipolarBlock<T>>(
+    units: Units<T>,
+    options: &RelativePoseOptions<T>,
+    guide: Guide<'_, T>,
+    workspace: &mut RelativePoseWorkspace<'_, T>,
+) -> RelativePoseEstimate<T> {
+    let count = workspace.count;
+    let blocks = B::slice(workspace.numbers);
+    let blocks = blocks.get(..count.div_ceil(LANES)).unwrap_or(blocks);
+    let data = BlockSlice { blocks, count };
+    let problem = PoseProblem::new(data, units.scales, options.max_error_px / units.pixels);
+    let order = match guide.scores {
+        Some(scores) => {
+            rank_by_score(scores, workspace.order);
+            workspace.order.get(..count)
+        }
+        None => None,
+    };
+    let consensus = ransac(&problem, &options.ransac, order, 10, guide.keep_going);
+    let Some((model, _)) = consensus.models[0] else {
+        workspace.inliers.iter_mut().take(count).for_each(|inlier| *inlier = false);
+        return RelativePoseEstimate {
+            verdict: RelativePoseVerdict::NoConsensus,
+            noise_px: T::ZERO,
+            report: consensus.report,
+        };
+    };
+    let minimum = problem.optimise(&model, &Loss::Truncated(problem.threshold), 10, lit(1e-6));
+    let model = minimum.model;
+    let mut mask = workspace.inliers.iter_mut();
+    problem.for_each_block(&model, |_, squared, filled| {
+        for (inlier, &s) in mask.by_ref().take(filled).zip(squared) {
+            *inlier = s < T::ONE;
+        }
+    });
+    let sums = &minimum.equations;
+    let freedom = from_u32::<T>(sums.active.saturating_sub(5).max(1));
+    let outside = from_u32::<T>((count as u32).saturating_sub(sums.active));
+    let squares = sums.cost - outside * problem.threshold * problem.threshold;
+    let variance = max(squares, T::ZERO) / freedom;
+    let covariance = Ldlt::new(&sums.hessian).map(|factors| factors.inverse() * variance);
+    RelativePoseEstimate {
+        verdict: RelativePoseVerdict::General(GeneralMotion { pose: model.pose(), covariance }),
+        noise_px: sqrt(variance) * units.pixels,
+        report: consensus.report,
+    }
+}

@@ -1,0 +1,249 @@
+//! Correspondences in fixed lanes, as scoring and refinement read them, and the epipolar residual on them.
+//!
+//! The squared Sampson error of a matrix `F` is `c^2 / d` with `c = x2' F x1` and
+//! `d = (F x1)' M2 (F x1) + (F' x2)' M1 (F' x2)`, where `M = J J'` is the metric of a view: `J` is the Jacobian of the
+//! homogeneous point or bearing by the pixel. On a plane with pixels of unit scale `M = diag(1, 1, 0)`.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::Real;
+use crate::robust::{LANES, Lanes};
+
+/// Some numbers of each of four correspondences, side by side.
+pub(crate) trait Block<T: Real>: Copy {
+    /// All lanes zero.
+    fn zero() -> Self;
+
+    /// Copies lane `from` of `source` to lane `to`.
+    fn set_lane(&mut self, to: usize, source: &Self, from: usize);
+
+    /// The blocks in a slice of numbers; what does not fill a block is left over.
+    fn slice(numbers: &[T]) -> &[Self];
+
+    /// The same, to write.
+    fn slice_mut(numbers: &mut [T]) -> &mut [Self];
+
+    /// Writes the numbers of one correspondence.
+    fn write_lane(&mut self, to: usize, numbers: &[T]);
+}
+
+impl<T: Real, const W: usize> Block<T> for [Lanes<T>; W] {
+    #[inline(always)]
+    fn zero() -> Self {
+        [[T::ZERO; LANES]; W]
+    }
+
+    #[inline(always)]
+    fn set_lane(&mut self, to: usize, source: &Self, from: usize) {
+        for (target, lanes) in self.iter_mut().zip(source) {
+            if let (Some(entry), Some(&value)) = (target.get_mut(to), lanes.get(from)) {
+                *entry = value;
+            }
+        }
+    }
+
+    fn slice(numbers: &[T]) -> &[Self] {
+        numbers.as_chunks::<LANES>().0.as_chunks::<W>().0
+    }
+
+    fn slice_mut(numbers: &mut [T]) -> &mut [Self] {
+        numbers.as_chunks_mut::<LANES>().0.as_chunks_mut::<W>().0
+    }
+
+    #[inline(always)]
+    fn write_lane(&mut self, to: usize, numbers: &[T]) {
+        for (target, &value) in self.iter_mut().zip(numbers) {
+            if let Some(entry) = target.get_mut(to) {
+                *entry = value;
+            }
+        }
+    }
+}
+
+/// Blocks and how many correspondences they hold; lanes beyond are ignored.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BlockSlice<'a, B> {
+    /// The blocks.
+    pub(crate) blocks: &'a [B],
+    /// How many lanes are filled.
+    pub(crate) count: usize,
+}
+
+/// Four correspondences under an epipolar constraint.
+pub(crate) trait EpipolarBlock<T: Real>: Block<T> {
+    /// `(c, d)` of the Sampson error: `r^2 = c^2 / d`.
+    fn residual(&self, f: &Matrix3<T>) -> (Lanes<T>, Lanes<T>);
+
+    /// `r` and its gradient by the entries of `f`, row by row.
+    fn gradient(&self, f: &Matrix3<T>) -> (Lanes<T>, [Lanes<T>; 9]);
+
+    /// The homogeneous points or bearings, component by component.
+    fn directions(&self) -> ([Lanes<T>; 3], [Lanes<T>; 3]);
+}
+
+/// Points of two image planes, in pixels of one common scale around the principal points: x1, y1, x2, y2.
+pub(crate) type PlaneBlock<T> = [Lanes<T>; 4];
+
+/// Bearings of two views with the metric of each, for lenses whose image is no plane: f1, f2, then `M = J J'` of
+/// view 1 and of view 2 as xx, xy, xz, yy, yz, zz.
+pub(crate) type BearingBlock<T> = [Lanes<T>; 18];
+
+impl<T: Real> EpipolarBlock<T> for PlaneBlock<T> {
+    #[inline(always)]
+    fn residual(&self, f: &Matrix3<T>) -> (Lanes<T>, Lanes<T>) {
+        let m = &f.data.0;
+        let (mut c, mut d) = ([T::ZERO; LANES], [T::ZERO; LANES]);
+        for l in 0..LANES {
+            let (x1, y1, x2, y2) = (self[0][l], self[1][l], self[2][l], self[3][l]);
+            let a = m[0][0] * x1 + m[1][0] * y1 + m[2][0];
+            let b = m[0][1] * x1 + m[1][1] * y1 + m[2][1];
+            let e = m[0][2] * x1 + m[1][2] * y1 + m[2][2];
+            let p = m[0][0] * x2 + m[0][1] * y2 + m[0][2];
+            let q = m[1][0] * x2 + m[1][1] * y2 + m[1][2];
+            c[l] = x2 * a + y2 * b + e;
+            d[l] = (a * a + b * b) + (p * p + q * q);
+        }
+        (c, d)
+    }
+
+    #[inline(always)]
+    fn gradient(&self, f: &Matrix3<T>) -> (Lanes<T>, [Lanes<T>; 9]) {
+        let m = &f.data.0;
+        let mut r = [T::ZERO; LANES];
+        let mut g = [[T::ZERO; LANES]; 9];
+        for l in 0..LANES {
+            let (x1, y1, x2, y2) = (self[0][l], self[1][l], self[2][l], self[3][l]);
+            let a = m[0][0] * x1 + m[1][0] * y1 + m[2][0];
+            let b = m[0][1] * x1 + m[1][1] * y1 + m[2][1];
+            let e = m[0][2] * x1 + m[1][2] * y1 + m[2][2];
+            let p = m[0][0] * x2 + m[0][1] * y2 + m[0][2];
+            let q = m[1][0] * x2 + m[1][1] * y2 + m[1][2];
+            let c = x2 * a + y2 * b + e;
+            let d = (a * a + b * b) + (p * p + q * q);
+            // A point on both epipoles has no residual and no direction to move.
+            let inverse = if d > T::ZERO { T::ONE / crate::real::sqrt(d) } else { T::ZERO };
+            let residual = c * inverse;
+            let k = residual * inverse;
+            // dr = (x2 x1' - k (M2 l2 x1' + x2 (M1 l1)')) / sqrt(d)
+            let (u, v) = ((x2 - k * a) * inverse, (y2 - k * b) * inverse);
+            let (s, t) = (k * p * inverse, k * q * inverse);
+            r[l] = residual;
+            g[0][l] = u * x1 - x2 * s;
+            g[1][l] = u * y1 - x2 * t;
+            g[2][l] = u;
+            g[3][l] = v * x1 - y2 * s;
+            g[4][l] = v * y1 - y2 * t;
+            g[5][l] = v;
+            g[6][l] = x1 * inverse - s;
+            g[7][l] = y1 * inverse - t;
+            g[8][l] = inverse;
+        }
+        (r, g)
+    }
+
+    #[inline(always)]
+    fn directions(&self) -> ([Lanes<T>; 3], [Lanes<T>; 3]) {
+        let one = [T::ONE; LANES];
+        ([self[0], self[1], one], [self[2], self[3], one])
+    }
+}
+
+#[inline(always)]
+fn dot<T: Real>(a: &[T; 3], b: &[T; 3]) -> T {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// `(f1, f2, l1 = F' f2, l2 = F f1)` of a lane.
+#[inline(always)]
+fn lines<T: Real>(block: &BearingBlock<T>, f: &Matrix3<T>, l: usize) -> ([T; 3], [T; 3], [T; 3], [T; 3]) {
+    let m = &f.data.0;
+    let f1 = [block[0][l], block[1][l], block[2][l]];
+    let f2 = [block[3][l], block[4][l], block[5][l]];
+    let l1 = [dot(&m[0], &f2), dot(&m[1], &f2), dot(&m[2], &f2)];
+    let row = |i: usize| m[0][i] * f1[0] + m[1][i] * f1[1] + m[2][i] * f1[2];
+    (f1, f2, l1, [row(0), row(1), row(2)])
+}
+
+/// The products of both metrics with the epipolar lines.
+#[inline(always)]
+fn metrics<T: Real>(block: &BearingBlock<T>, l: usize, l1: &[T; 3], l2: &[T; 3]) -> ([T; 3], [T; 3]) {
+    let b = block;
+    let (xx, xy, xz, yy, yz, zz) = (b[6][l], b[7][l], b[8][l], b[9][l], b[10][l], b[11][l]);
+    let n1 = [dot(&[xx, xy, xz], l1), dot(&[xy, yy, yz], l1), dot(&[xz, yz, zz], l1)];
+    let (xx, xy, xz, yy, yz, zz) = (b[12][l], b[13][l], b[14][l], b[15][l], b[16][l], b[17][l]);
+    let n2 = [dot(&[xx, xy, xz], l2), dot(&[xy, yy, yz], l2), dot(&[xz, yz, zz], l2)];
+    (n1, n2)
+}
+
+impl<T: Real> EpipolarBlock<T> for BearingBlock<T> {
+    #[inline(always)]
+    fn residual(&self, f: &Matrix3<T>) -> (Lanes<T>, Lanes<T>) {
+        let (mut c, mut d) = ([T::ZERO; LANES], [T::ZERO; LANES]);
+        for l in 0..LANES {
+            let (_, f2, l1, l2) = lines(self, f, l);
+            let (n1, n2) = metrics(self, l, &l1, &l2);
+            c[l] = dot(&f2, &l2);
+            d[l] = dot(&l2, &n2) + dot(&l1, &n1);
+        }
+        (c, d)
+    }
+
+    #[inline(always)]
+    fn gradient(&self, f: &Matrix3<T>) -> (Lanes<T>, [Lanes<T>; 9]) {
+        let mut r = [T::ZERO; LANES];
+        let mut g = [[T::ZERO; LANES]; 9];
+        for l in 0..LANES {
+            let (f1, f2, l1, l2) = lines(self, f, l);
+            let (n1, n2) = metrics(self, l, &l1, &l2);
+            let c = dot(&f2, &l2);
+            let d = dot(&l2, &n2) + dot(&l1, &n1);
+            let inverse = if d > T::ZERO { T::ONE / crate::real::sqrt(d) } else { T::ZERO };
+            r[l] = c * inverse;
+            let k = r[l] * inverse;
+            for i in 0..3 {
+                let u = (f2[i] - k * n2[i]) * inverse;
+                for j in 0..3 {
+                    g[3 * i + j][l] = u * f1[j] - f2[i] * (k * n1[j] * inverse);
+                }
+            }
+        }
+        (r, g)
+    }
+
+    #[inline(always)]
+    fn directions(&self) -> ([Lanes<T>; 3], [Lanes<T>; 3]) {
+        ([self[0], self[1], self[2]], [self[3], self[4], self[5]])
+    }
+}
+
+/// Which lanes hold a point that lies in front of both cameras of a pose `X2 = R X1 + t`, or whose rays are parallel
+/// to within noise, so that its depth says nothing: `parallel_sq` is the squared sine up to which they are.
+#[inline(always)]
+pub(crate) fn in_front<T: Real>(
+    f1: &[Lanes<T>; 3],
+    f2: &[Lanes<T>; 3],
+    rotation: &Matrix3<T>,
+    translation: &Vector3<T>,
+    parallel_sq: T,
+) -> [bool; LANES] {
+    let r = &rotation.data.0;
+    let t = &translation.data.0[0];
+    let mut front = [false; LANES];
+    for l in 0..LANES {
+        let (x, y, z) = (f1[0][l], f1[1][l], f1[2][l]);
+        let a = [
+            r[0][0] * x + r[1][0] * y + r[2][0] * z,
+            r[0][1] * x + r[1][1] * y + r[2][1] * z,
+            r[0][2] * x + r[1][2] * y + r[2][2] * z,
+        ];
+        let b = [f2[0][l], f2[1][l], f2[2][l]];
+        // d1 a + t = d2 b, in the least-squares sense: both depths times |a x b|^2.
+        let (aa, bb, ab) = (dot(&a, &a), dot(&b, &b), dot(&a, &b));
+        let (ta, tb) = (dot(t, &a), dot(t, &b));
+        let depth1 = ab * tb - bb * ta;
+        let depth2 = aa * tb - ab * ta;
+        let parallel = aa * bb - ab * ab <= parallel_sq * aa * bb && ab > T::ZERO;
+        front[l] = (depth1 > T::ZERO && depth2 > T::ZERO) || parallel;
+    }
+    front
+}

@@ -1,0 +1,207 @@
+//! Levenberg and Marquardt's method for matrices on a manifold, with the Sampson error of blocks of correspondences.
+
+use nalgebra::{Matrix3, SMatrix, SVector};
+
+use super::blocks::{BlockSlice, EpipolarBlock};
+use crate::Real;
+use crate::linalg::Ldlt;
+use crate::real::{from_u32, lit};
+use crate::robust::{LANES, Lanes, Loss};
+
+/// A model whose epipolar matrix depends on `P` local parameters.
+pub(crate) trait Manifold<T: Real, const P: usize>: Copy {
+    /// The matrix of `x2' F x1`.
+    fn matrix(&self) -> Matrix3<T>;
+    /// Its derivative by each local parameter, row by row.
+    fn tangents(&self) -> [[T; 9]; P];
+    /// The model moved by a step in the local parameters.
+    fn retract(&self, step: &SVector<T, P>) -> Self;
+}
+
+/// Sums of one pass: `J'WJ`, `J'Wr` and the cost.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct NormalEquations<T: Real, const P: usize> {
+    /// `J' W J`.
+    pub(crate) hessian: SMatrix<T, P, P>,
+    /// `J' W r`.
+    pub(crate) gradient: SVector<T, P>,
+    /// Sum of the losses of all correspondences.
+    pub(crate) cost: T,
+    /// Correspondences with a weight above zero.
+    pub(crate) active: u32,
+}
+
+struct Sums<T, const P: usize> {
+    hessian: [[Lanes<T>; P]; P],
+    gradient: [Lanes<T>; P],
+    cost: Lanes<T>,
+}
+
+impl<T: Real, const P: usize> Sums<T, P> {
+    /// Adds the lanes of a block of which the first `filled` count.
+    #[inline(always)]
+    fn add<B: EpipolarBlock<T>>(
+        &mut self,
+        block: &B,
+        f: &Matrix3<T>,
+        tangents: &[[T; 9]; P],
+        loss: &Loss<T>,
+        filled: usize,
+    ) {
+        let (r, g) = block.gradient(f);
+        let mut w = [T::ZERO; LANES];
+        for l in 0..LANES {
+            if l < filled {
+                let (cost, weight) = loss.evaluate(r[l] * r[l]);
+                self.cost[l] += cost;
+                w[l] = weight;
+            }
+        }
+        let mut j = [[T::ZERO; LANES]; P];
+        for p in 0..P {
+            for l in 0..LANES {
+                let mut sum = g[0][l] * tangents[p][0];
+                for k in 1..9 {
+                    sum += g[k][l] * tangents[p][k];
+                }
+                j[p][l] = sum;
+            }
+        }
+        for p in 0..P {
+            let mut weighted = [T::ZERO; LANES];
+            for l in 0..LANES {
+                weighted[l] = w[l] * j[p][l];
+                self.gradient[p][l] += weighted[l] * r[l];
+            }
+            for q in 0..P {
+                if q <= p {
+                    for l in 0..LANES {
+                        self.hessian[p][q][l] += weighted[l] * j[q][l];
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn total<T: Real>(lanes: &Lanes<T>) -> T {
+    (lanes[0] + lanes[1]) + (lanes[2] + lanes[3])
+}
+
+/// One pass over all correspondences. Those beyond the loss's support are left out; the others are packed into full
+/// blocks first, so that the derivatives are computed for them alone and no second copy of the data is needed.
+pub(crate) fn normal_equations<T, B, M, const P: usize>(
+    data: BlockSlice<'_, B>,
+    model: &M,
+    loss: &Loss<T>,
+) -> NormalEquations<T, P>
+where
+    T: Real,
+    B: EpipolarBlock<T>,
+    M: Manifold<T, P>,
+{
+    let f = model.matrix();
+    let tangents = model.tangents();
+    let zero = [T::ZERO; LANES];
+    let mut sums = Sums { hessian: [[zero; P]; P], gradient: [zero; P], cost: zero };
+    let support = loss.support();
+    let limit = support.unwrap_or(T::MAX);
+    let mut active = 0u32;
+    let mut pending = B::zero();
+    let mut filled = 0usize;
+    let mut left = data.count;
+    for block in data.blocks {
+        let (c, d) = block.residual(&f);
+        for l in 0..LANES {
+            if l < left && c[l] * c[l] < limit * d[l] {
+                pending.set_lane(filled, block, l);
+                filled += 1;
+                active += 1;
+                if filled == LANES {
+                    sums.add(&pending, &f, &tangents, loss, LANES);
+                    filled = 0;
+                }
+            }
+        }
+        left = left.saturating_sub(LANES);
+    }
+    if filled > 0 {
+        sums.add(&pending, &f, &tangents, loss, filled);
+    }
+    let mut hessian = SMatrix::<T, P, P>::zeros();
+    let mut gradient = SVector::<T, P>::zeros();
+    for p in 0..P {
+        gradient.data.0[0][p] = total(&sums.gradient[p]);
+        for q in 0..P {
+            let (a, b) = if q <= p { (p, q) } else { (q, p) };
+            hessian.data.0[q][p] = total(&sums.hessian[a][b]);
+        }
+    }
+    let outside = from_u32::<T>((data.count as u32).saturating_sub(active));
+    let beyond = support.map_or(T::ZERO, |limit| loss.evaluate(limit).0);
+    NormalEquations { hessian, gradient, cost: total(&sums.cost) + outside * beyond, active }
+}
+
+/// How a minimisation ended.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Minimum<M, T: Real, const P: usize> {
+    /// The best model.
+    pub(crate) model: M,
+    /// The sums there.
+    pub(crate) equations: NormalEquations<T, P>,
+    /// Passes over the data.
+    pub(crate) passes: u32,
+}
+
+/// Minimises the loss from `start` in at most `max_passes` passes over the data; ends where a step lowers the cost by
+/// less than the share `tolerance`.
+pub(crate) fn minimise<T, B, M, const P: usize>(
+    data: BlockSlice<'_, B>,
+    start: &M,
+    loss: &Loss<T>,
+    max_passes: u32,
+    tolerance: T,
+) -> Minimum<M, T, P>
+where
+    T: Real,
+    B: EpipolarBlock<T>,
+    M: Manifold<T, P>,
+{
+    let mut best = Minimum { model: *start, equations: normal_equations(data, start, loss), passes: 1 };
+    let mut damping: T = lit(1e-4);
+    while best.passes < max_passes {
+        if (best.equations.active as usize) < P {
+            break;
+        }
+        let mut damped = best.equations.hessian;
+        for p in 0..P {
+            let diagonal = damped.data.0[p][p];
+            damped.data.0[p][p] = diagonal + damping * diagonal;
+        }
+        let Some(factors) = Ldlt::new(&damped) else {
+            damping *= lit(100.0);
+            best.passes += 1;
+            continue;
+        };
+        let step = -factors.solve(&best.equations.gradient);
+        let model = best.model.retract(&step);
+        let equations = normal_equations(data, &model, loss);
+        best.passes += 1;
+        let (old, new) = (best.equations.cost, equations.cost);
+        if new < old {
+            best.model = model;
+            best.equations = equations;
+            damping *= lit(0.1);
+            if old - new <= tolerance * old {
+                break;
+            }
+        } else {
+            if !(new - old > tolerance * old) {
+                break;
+            }
+            damping *= lit(20.0);
+        }
+    }
+    best
+}

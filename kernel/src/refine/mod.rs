@@ -1,0 +1,7 @@
+//! Non-linear refinement of one model on many correspondences.
+
+pub(crate) mod blocks;
+pub(crate) mod lm;
+pub(crate) mod relative_pose;
+
+pub use relative_pose::tangent_basis;

@@ -1,0 +1,168 @@
+//! A relative pose as the model of refinement: rotation and direction of translation, five degrees of freedom.
+
+use nalgebra::{Matrix3, SVector, Vector3};
+
+use super::lm::Manifold;
+use crate::Real;
+use crate::geometry::Pose;
+use crate::geometry::pose::from_parts;
+use crate::real::{abs, sqrt};
+
+/// A rotation, a unit translation, and the scales between normalised coordinates and the blocks' coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PoseModel<T: Real> {
+    /// `R`.
+    pub(crate) rotation: Matrix3<T>,
+    /// `t`, of length 1.
+    pub(crate) translation: Vector3<T>,
+    /// Block coordinates are these scales times normalised ones.
+    pub(crate) scales: Scales<T>,
+}
+
+/// Coordinates of the blocks over normalised coordinates: (x, y) of view 1 and of view 2. All 1 for bearings and
+/// where both cameras have one focal length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Scales<T> {
+    /// View 1.
+    pub(crate) view1: [T; 2],
+    /// View 2.
+    pub(crate) view2: [T; 2],
+}
+
+impl<T: Real> Scales<T> {
+    /// No scaling.
+    #[must_use]
+    pub(crate) fn unit() -> Self {
+        Self { view1: [T::ONE; 2], view2: [T::ONE; 2] }
+    }
+
+    /// `D2^-1 E D1^-1` with `D = diag(scales, 1)`.
+    #[inline]
+    fn apply(&self, e: &Matrix3<T>) -> Matrix3<T> {
+        let (a, b) = (self.inverse1(), self.inverse2());
+        let m = &e.data.0;
+        let column = |j: usize, s: T| [m[j][0] * b[0] * s, m[j][1] * b[1] * s, m[j][2] * s];
+        let mut result = *e;
+        result.data.0 = [column(0, a[0]), column(1, a[1]), column(2, T::ONE)];
+        result
+    }
+
+    /// Normalised coordinates over those of the blocks, view 1.
+    #[inline]
+    #[must_use]
+    pub(crate) fn inverse1(&self) -> [T; 2] {
+        [T::ONE / self.view1[0], T::ONE / self.view1[1]]
+    }
+
+    /// Normalised coordinates over those of the blocks, view 2.
+    #[inline]
+    #[must_use]
+    pub(crate) fn inverse2(&self) -> [T; 2] {
+        [T::ONE / self.view2[0], T::ONE / self.view2[1]]
+    }
+}
+
+/// Two unit vectors orthogonal to the unit vector `t` and to each other: the documented basis of the tangent plane of
+/// the sphere of translations. The first is the cross product of `t` with the axis on which `t` is smallest.
+#[must_use]
+pub fn tangent_basis<T: Real>(t: &Vector3<T>) -> (Vector3<T>, Vector3<T>) {
+    let (a, b, c) = (abs(t.x), abs(t.y), abs(t.z));
+    let (zero, one) = (T::ZERO, T::ONE);
+    let axis = if a <= b && a <= c {
+        Vector3::new(one, zero, zero)
+    } else if b <= c {
+        Vector3::new(zero, one, zero)
+    } else {
+        Vector3::new(zero, zero, one)
+    };
+    let u = t.cross(&axis);
+    let u = u * (one / sqrt(u.norm_squared()));
+    (u, t.cross(&u))
+}
+
+/// A rotation near `Exp(w)`: exact as a rotation, equal to the exponential to second order (Cayley's map of w / 2).
+#[inline]
+pub(crate) fn cayley<T: Real>(w: &Vector3<T>) -> Matrix3<T> {
+    let h = w * T::HALF;
+    let s = T::TWO / (T::ONE + h.norm_squared());
+    let (x, y, z) = (h.x, h.y, h.z);
+    let one = T::ONE;
+    Matrix3::new(
+        one - s * (y * y + z * z),
+        s * (x * y - z),
+        s * (x * z + y),
+        s * (x * y + z),
+        one - s * (x * x + z * z),
+        s * (y * z - x),
+        s * (x * z - y),
+        s * (y * z + x),
+        one - s * (x * x + y * y),
+    )
+}
+
+impl<T: Real> PoseModel<T> {
+    /// The pose `X2 = R X1 + t`, |t| = 1.
+    #[must_use]
+    pub(crate) fn pose(&self) -> Pose<T> {
+        from_parts(&self.rotation, &self.translation)
+    }
+
+    /// `E = [t]x R`, column by column.
+    #[inline]
+    fn essential(&self) -> Matrix3<T> {
+        let mut e = self.rotation;
+        let t = &self.translation.data.0[0];
+        for column in &mut e.data.0 {
+            *column = cross(t, column);
+        }
+        e
+    }
+}
+
+#[inline(always)]
+fn cross<T: Real>(a: &[T; 3], b: &[T; 3]) -> [T; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+impl<T: Real> Manifold<T, 5> for PoseModel<T> {
+    #[inline]
+    fn matrix(&self) -> Matrix3<T> {
+        self.scales.apply(&self.essential())
+    }
+
+    fn tangents(&self) -> [[T; 9]; 5] {
+        let (u, v) = tangent_basis(&self.translation);
+        let t = &self.translation.data.0[0];
+        let (s1, s2) = (self.scales.inverse1(), self.scales.inverse2());
+        let (s1, s2) = ([s1[0], s1[1], T::ONE], [s2[0], s2[1], T::ONE]);
+        let mut result = [[T::ZERO; 9]; 5];
+        for j in 0..3 {
+            let y = &self.rotation.data.0[j];
+            let ty = t[0] * y[0] + t[1] * y[1] + t[2] * y[2];
+            let along = [cross(&u.data.0[0], y), cross(&v.data.0[0], y)];
+            for i in 0..3 {
+                let s = s2[i] * s1[j];
+                for k in 0..3 {
+                    // t x (e_k x y) = e_k (t.y) - t_k y
+                    let own = if i == k { ty } else { T::ZERO };
+                    result[k][3 * i + j] = s * (own - t[k] * y[i]);
+                }
+                result[3][3 * i + j] = s * along[0][i];
+                result[4][3 * i + j] = s * along[1][i];
+            }
+        }
+        result
+    }
+
+    #[inline]
+    fn retract(&self, step: &SVector<T, 5>) -> Self {
+        let s = &step.data.0[0];
+        let (u, v) = tangent_basis(&self.translation);
+        let t = self.translation + u * s[3] + v * s[4];
+        Self {
+            rotation: cayley(&Vector3::new(s[0], s[1], s[2])) * self.rotation,
+            translation: t * (T::ONE / sqrt(t.norm_squared())),
+            scales: self.scales,
+        }
+    }
+}

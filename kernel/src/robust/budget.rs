@@ -1,0 +1,174 @@
+//! What a run may spend, what it spent, and why it stopped.
+
+use core::fmt;
+
+use crate::Real;
+use crate::real::{is_finite, lit};
+
+/// Limits and seed of a robust estimation. The defaults suit every estimator of this crate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct RansacOptions<T> {
+    /// Probability, in (0, 1), that a sample of inliers only has been drawn when the run stops by itself.
+    /// Default 0.999.
+    pub confidence: T,
+    /// Iterations made at the least, so that one lucky sample does not end the run. Default 20.
+    pub min_iterations: u32,
+    /// What the run may spend at the most. Default: 10,000 iterations, everything else unlimited.
+    pub budget: Budget,
+    /// Seed of the samples; the same seed and input give the same bits. Default 1.
+    pub seed: u64,
+}
+
+/// Upper limits of a run; `u32::MAX` and `u64::MAX` mean none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub struct Budget {
+    /// Samples drawn. Default 10,000.
+    pub max_iterations: u32,
+    /// Minimal problems solved (degenerate samples cost none). Default: no limit.
+    pub max_solver_calls: u32,
+    /// Residuals evaluated, of one correspondence under one model each. Default: no limit. The work done beyond it
+    /// is at most one hypothesis and one refinement.
+    pub max_residuals: u64,
+}
+
+impl Default for Budget {
+    fn default() -> Self {
+        Self { max_iterations: 10_000, max_solver_calls: u32::MAX, max_residuals: u64::MAX }
+    }
+}
+
+impl<T: Real> Default for RansacOptions<T> {
+    fn default() -> Self {
+        Self { confidence: lit::<T>(0.999), min_iterations: 20, budget: Budget::default(), seed: 1 }
+    }
+}
+
+impl<T: Real> RansacOptions<T> {
+    /// What is wrong with the options, if anything.
+    pub fn check(&self) -> Result<(), OptionsError> {
+        if !(self.confidence > T::ZERO && self.confidence < T::ONE) {
+            return Err(OptionsError::Confidence);
+        }
+        if self.budget.max_iterations == 0 {
+            return Err(OptionsError::NoIterations);
+        }
+        Ok(())
+    }
+}
+
+/// Which option is out of its range. Outputs are untouched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum OptionsError {
+    /// `max_error_px` is not a positive finite number.
+    MaxError,
+    /// `sigma_px` is given and not a positive finite number.
+    Sigma,
+    /// `confidence` is not inside (0, 1).
+    Confidence,
+    /// `max_iterations` is 0.
+    NoIterations,
+}
+
+impl fmt::Display for OptionsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::MaxError => "max_error_px must be positive and finite",
+            Self::Sigma => "sigma_px must be positive and finite",
+            Self::Confidence => "confidence must lie between 0 and 1",
+            Self::NoIterations => "max_iterations must not be 0",
+        })
+    }
+}
+
+impl core::error::Error for OptionsError {}
+
+/// Checks a threshold and a noise level in pixels; gives the noise level, by default half the threshold.
+pub(crate) fn check_noise<T: Real>(max_error_px: T, sigma_px: Option<T>) -> Result<T, OptionsError> {
+    let positive = |x: T| is_finite(x) && x > T::ZERO;
+    if !positive(max_error_px) {
+        return Err(OptionsError::MaxError);
+    }
+    let sigma = sigma_px.unwrap_or(max_error_px * T::HALF);
+    if positive(sigma) { Ok(sigma) } else { Err(OptionsError::Sigma) }
+}
+
+/// What a caller may know or want to decide during a run; [`Guide::none`] for neither.
+pub struct Guide<'a, T> {
+    /// One number a correspondence, lower is better (a descriptor distance or ratio): samples are drawn best first.
+    /// NaN ranks last.
+    pub scores: Option<&'a [T]>,
+    /// "May I go on?", asked before every [`Guide::INTERVAL`]-th iteration, the first excepted.
+    pub keep_going: Option<&'a mut dyn FnMut(&Progress) -> bool>,
+}
+
+impl<T> Guide<'_, T> {
+    /// Iterations between two questions to `keep_going`.
+    pub const INTERVAL: u32 = 8;
+
+    /// No scores and no questions.
+    #[must_use]
+    pub const fn none() -> Self {
+        Guide { scores: None, keep_going: None }
+    }
+}
+
+/// What a run has spent so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Progress {
+    /// Samples drawn.
+    pub iterations: u32,
+    /// Minimal problems solved.
+    pub solver_calls: u32,
+    /// Hypotheses scored.
+    pub hypotheses: u32,
+    /// Residuals evaluated.
+    pub residuals: u64,
+    /// Local optimisations made.
+    pub refinements: u32,
+    /// Inliers of the best model.
+    pub inliers: u32,
+}
+
+/// Why a run ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum StopReason {
+    /// The confidence was reached.
+    #[default]
+    Confident,
+    /// `max_iterations` was reached.
+    MaxIterations,
+    /// `max_solver_calls` was reached.
+    MaxSolverCalls,
+    /// `max_residuals` was reached.
+    MaxResiduals,
+    /// The caller's `keep_going` answered no. The same input with `max_iterations` set to the reported number of
+    /// iterations gives the same bits.
+    Interrupted,
+}
+
+/// How a run went.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct RansacReport<T> {
+    /// What was spent.
+    pub spent: Progress,
+    /// Why it ended.
+    pub stop: StopReason,
+    /// Inliers of the model returned; 0 without one.
+    pub inliers: u32,
+    /// The model's truncated squared error: the sum over all correspondences of min(r^2 / threshold^2, 1).
+    pub cost: T,
+    /// Probability that no sample of inliers only was drawn, given the inliers found: the hypergeometric chance of
+    /// one draw to the power of the iterations. 1 without a model.
+    pub miss_probability: T,
+    /// Without consensus: a larger share of inliers than this would have been sampled, with the confidence asked.
+    pub excluded_inlier_ratio: T,
+}

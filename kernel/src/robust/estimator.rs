@@ -1,0 +1,43 @@
+//! What the engine asks of a problem.
+
+use super::score::{Gate, Score};
+use crate::Real;
+
+/// A model-fitting problem over numbered correspondences, with minimal samples of `S`.
+///
+/// An implementation owns or borrows the correspondences. Every method is a pure function of its arguments and of
+/// them, so that a run is repeated bit for bit.
+pub trait Estimator<T: Real, const S: usize> {
+    /// What is estimated.
+    type Model: Copy;
+
+    /// How many correspondences there are.
+    fn count(&self) -> u32;
+
+    /// Hands every model of a minimal sample that passes its own checks (cheirality, orientation) to `found`; false,
+    /// and nothing handed over, where the sample was rejected as degenerate before it was solved.
+    fn generate(&self, sample: &[u32; S], found: &mut impl FnMut(&Self::Model)) -> bool;
+
+    /// The score of a model, or none where `gate` rejected it; adds the residuals evaluated and, of a rejected model,
+    /// its inliers to the counts.
+    fn score(&self, model: &Self::Model, gate: &Gate<T>, counts: &mut ScoreCounts) -> Option<Score<T>>;
+
+    /// The model after local optimisation on its inliers; none where that failed. Adds the residuals evaluated.
+    fn refine(&self, model: &Self::Model, residuals: &mut u64) -> Option<Self::Model>;
+
+    /// True where the model, although it scores best, must not stand.
+    fn reject(&self, _model: &Self::Model) -> bool {
+        false
+    }
+}
+
+/// What scoring adds up.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ScoreCounts {
+    /// Residuals evaluated.
+    pub residuals: u64,
+    /// Residuals evaluated of rejected models.
+    pub rejected_residuals: u64,
+    /// Inliers among those.
+    pub rejected_inliers: u64,
+}

@@ -1,0 +1,166 @@
+//! Random sample consensus: hypothesise, score with early exit, optimise what leads, stop when confident.
+
+use super::budget::{Guide, Progress, RansacOptions, RansacReport, StopReason};
+use super::estimator::{Estimator, ScoreCounts};
+use super::sampler::Sampler;
+use super::score::{Gate, Score};
+use super::stopping::{iterations_needed, miss_probability, undetected_inlier_ratio};
+use crate::Real;
+use crate::real::{from_u32, lit, max, min};
+
+/// How many locally optimised models a run keeps, best first.
+pub const KEPT: usize = 4;
+
+/// What a run found: models after local optimisation, best first, and how it went.
+#[derive(Clone, Copy, Debug)]
+pub struct Consensus<M, T> {
+    /// The best model and the runners-up of other samples (often the same optimum again).
+    pub models: [Option<(M, Score<T>)>; KEPT],
+    /// How the run went.
+    pub report: RansacReport<T>,
+}
+
+/// The consensus of an estimator's correspondences.
+///
+/// `order` maps the ranks of ranked sampling to correspondences; without it samples are uniform. `least_inliers` is
+/// the smallest consensus of interest: it sharpens the sequential test while nothing has been found. `keep_going` is
+/// asked before every [`Guide::INTERVAL`]-th iteration.
+///
+/// A hypothesis that beats all minimal models before it is optimised locally; the run ends once samples enough for
+/// the inliers of the best optimised model have been drawn.
+///
+/// # References
+/// M. Fischler, R. Bolles, "Random sample consensus", Communications of the ACM, 1981.
+/// O. Chum, J. Matas, J. Kittler, "Locally optimized RANSAC", DAGM 2003.
+pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
+    estimator: &E,
+    options: &RansacOptions<T>,
+    order: Option<&[u32]>,
+    least_inliers: u32,
+    mut keep_going: Option<&mut dyn FnMut(&Progress) -> bool>,
+) -> Consensus<E::Model, T> {
+    let count = estimator.count();
+    let size = S as u32;
+    let mut sampler: Sampler<T> = match order {
+        Some(_) => Sampler::ranked(options.seed, count, size),
+        None => Sampler::uniform(options.seed, count),
+    };
+    let mut models: [Option<(E::Model, Score<T>)>; KEPT] = [None; KEPT];
+    let mut spent = Progress::default();
+    let mut counts = ScoreCounts::default();
+    let mut refined_residuals = 0u64;
+    let mut minimal_cost = T::MAX;
+    let mut needed = u32::MAX;
+    let mut gate = gate::<T>(T::MAX, least_inliers, count, &counts);
+    let budget = options.budget;
+    let mut stop = StopReason::MaxIterations;
+
+    while spent.iterations < budget.max_iterations {
+        if spent.iterations >= max_u32(needed, options.min_iterations) {
+            stop = StopReason::Confident;
+            break;
+        }
+        if spent.solver_calls >= budget.max_solver_calls {
+            stop = StopReason::MaxSolverCalls;
+            break;
+        }
+        if spent.residuals >= budget.max_residuals {
+            stop = StopReason::MaxResiduals;
+            break;
+        }
+        if spent.iterations > 0
+            && spent.iterations.is_multiple_of(Guide::<T>::INTERVAL)
+            && let Some(ask) = keep_going.as_mut()
+            && !ask(&spent)
+        {
+            stop = StopReason::Interrupted;
+            break;
+        }
+        let Some(mut sample) = sampler.sample::<S>(spent.iterations) else { break };
+        spent.iterations += 1;
+        if let Some(order) = order {
+            for entry in &mut sample {
+                *entry = order.get(*entry as usize).copied().unwrap_or(0);
+            }
+        }
+
+        let mut leader = None;
+        let mut hypotheses = 0;
+        let solved = estimator.generate(&sample, &mut |model| {
+            hypotheses += 1;
+            gate.bound = minimal_cost;
+            let score = estimator.score(model, &gate, &mut counts);
+            if let Some(score) = score.filter(|score| score.cost < minimal_cost) {
+                minimal_cost = score.cost;
+                leader = Some((*model, score));
+            }
+        });
+        spent.solver_calls += solved as u32;
+        spent.hypotheses += hypotheses;
+        spent.residuals = counts.residuals + refined_residuals;
+
+        let Some((model, score)) = leader else { continue };
+        let mut candidate = (model, score);
+        if spent.residuals < budget.max_residuals {
+            spent.refinements += 1;
+            if let Some(refined) = estimator.refine(&model, &mut refined_residuals) {
+                let bound = Gate::at(score.cost);
+                if let Some(better) = estimator.score(&refined, &bound, &mut counts) {
+                    candidate = (refined, better);
+                }
+            }
+            spent.residuals = counts.residuals + refined_residuals;
+        }
+        let leads = models[0].is_none_or(|(_, best)| candidate.1.cost < best.cost);
+        if leads && estimator.reject(&candidate.0) {
+            continue;
+        }
+        keep(&mut models, candidate);
+        if leads {
+            spent.inliers = candidate.1.inliers;
+            needed = iterations_needed(options.confidence, spent.inliers, count, size);
+            gate = self::gate(minimal_cost, max_u32(least_inliers, spent.inliers), count, &counts);
+        }
+    }
+
+    let best = models[0].map(|(_, score)| score);
+    let inliers = best.map_or(0, |score| score.inliers);
+    Consensus {
+        models,
+        report: RansacReport {
+            spent,
+            stop,
+            inliers,
+            cost: best.map_or(from_u32(count), |score| score.cost),
+            miss_probability: miss_probability(spent.iterations, inliers, count, size),
+            excluded_inlier_ratio: undetected_inlier_ratio(options.confidence, spent.iterations, count, size),
+        },
+    }
+}
+
+fn max_u32(a: u32, b: u32) -> u32 {
+    if a > b { a } else { b }
+}
+
+/// The sequential test between `inliers` of `count` and the share of inliers that rejected models had so far.
+fn gate<T: Real>(bound: T, inliers: u32, count: u32, counts: &ScoreCounts) -> Gate<T> {
+    let ratio = |a: u64, b: u64| lit::<T>(a as f64) / lit::<T>(b as f64);
+    // Before enough is known, 5 %; a measured share is kept within what separates right from wrong.
+    let bad = if counts.rejected_residuals < 500 {
+        lit(0.05)
+    } else {
+        min(ratio(counts.rejected_inliers, counts.rejected_residuals), lit(0.5))
+    };
+    Gate::new(bound, ratio(inliers as u64, max_u32(count, 1) as u64), max(bad, lit(0.01)))
+}
+
+/// Inserts a model by its cost; the worst falls off.
+fn keep<M: Copy, T: Real>(models: &mut [Option<(M, Score<T>)>; KEPT], candidate: (M, Score<T>)) {
+    let mut moving = Some(candidate);
+    for place in models {
+        let Some((_, score)) = &moving else { return };
+        if place.is_none_or(|(_, kept)| score.cost < kept.cost) {
+            core::mem::swap(place, &mut moving);
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! When enough samples have been drawn, and what chance explains.
+
+use crate::Real;
+use crate::real::{exp, from_u32, lit, ln, max, min};
+
+/// The probability that `sample_size` draws without replacement from `count` correspondences hit `inliers` only:
+/// the product of (inliers - i) / (count - i).
+///
+/// ```
+/// use epipole::robust::probability_of_inlier_sample;
+/// assert_eq!(probability_of_inlier_sample::<f64>(4, 8, 2), 4.0 * 3.0 / (8.0 * 7.0));
+/// ```
+#[must_use]
+pub fn probability_of_inlier_sample<T: Real>(inliers: u32, count: u32, sample_size: u32) -> T {
+    if inliers < sample_size || count < inliers {
+        return T::ZERO;
+    }
+    let mut p = T::ONE;
+    for i in 0..sample_size.min(16) {
+        p *= from_u32::<T>(inliers - i) / from_u32::<T>(count - i);
+    }
+    p
+}
+
+/// `-ln(1 - p)`, accurate for small `p` too; `T::MAX` for p >= 1.
+fn minus_ln_1m<T: Real>(p: T) -> T {
+    if p >= T::ONE {
+        T::MAX
+    } else if p < lit::<T>(0.01) {
+        // Five terms of the series: the sixth is below 1e-12 relative to the first.
+        let mut sum = T::ZERO;
+        for k in [5.0, 4.0, 3.0, 2.0, 1.0] {
+            sum = sum * p + T::ONE / lit::<T>(k);
+        }
+        sum * p
+    } else {
+        -ln(T::ONE - p)
+    }
+}
+
+/// How many samples make it `confidence` likely that one of them held inliers only, by the exact hypergeometric
+/// probability; `u32::MAX` where no number does.
+#[must_use]
+pub fn iterations_needed<T: Real>(confidence: T, inliers: u32, count: u32, sample_size: u32) -> u32 {
+    let p = probability_of_inlier_sample::<T>(inliers, count, sample_size);
+    if p <= T::ZERO {
+        return u32::MAX;
+    }
+    let n = minus_ln_1m(confidence) / minus_ln_1m(p);
+    // Rounded up; beyond 2^31 there is no point in counting.
+    if n < lit::<T>(2_147_483_648.0) { n.to_f64() as u32 + 1 } else { u32::MAX }
+}
+
+/// The probability that none of `iterations` samples held inliers only.
+#[must_use]
+pub fn miss_probability<T: Real>(iterations: u32, inliers: u32, count: u32, sample_size: u32) -> T {
+    let p = probability_of_inlier_sample::<T>(inliers, count, sample_size);
+    if p >= T::ONE && iterations > 0 {
+        return T::ZERO;
+    }
+    exp(-min(minus_ln_1m(p) * from_u32::<T>(iterations), lit::<T>(700.0)))
+}
+
+/// The smallest share of inliers that `iterations` samples would have caught with `confidence`: a larger one is
+/// excluded where no consensus was found. By bisection over the number of inliers.
+#[must_use]
+pub fn undetected_inlier_ratio<T: Real>(confidence: T, iterations: u32, count: u32, sample_size: u32) -> T {
+    let (mut low, mut high) = (0u32, count);
+    for _ in 0..32 {
+        let middle = low + (high - low) / 2;
+        if middle == low {
+            break;
+        }
+        if iterations_needed(confidence, middle, count, sample_size) <= iterations {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    from_u32::<T>(high) / from_u32::<T>(count.max(1))
+}
+
+/// An upper bound of `ln P(B >= k)` for a binomial `B` of `n` trials with success probability `p`, by Hoeffding's
+/// inequality in its relative-entropy form: `-n D(k/n || p)`, 0 where `k <= n p`.
+#[must_use]
+pub fn log_binomial_tail<T: Real>(n: u32, k: u32, p: T) -> T {
+    if n == 0 || k == 0 || k > n {
+        return T::ZERO;
+    }
+    let total = from_u32::<T>(n);
+    let p = max(min(p, T::ONE - T::EPSILON), T::MIN_POSITIVE);
+    let q = from_u32::<T>(k) / total;
+    if q <= p {
+        return T::ZERO;
+    }
+    let hit = q * ln(q / p);
+    let miss = if k < n { (T::ONE - q) * ln((T::ONE - q) / (T::ONE - p)) } else { T::ZERO };
+    -(total * (hit + miss))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn iterations_reach_the_confidence() {
+        for (inliers, count) in [(50, 100), (20, 100), (100, 2000), (5, 5), (99, 100)] {
+            let n = iterations_needed(0.999f64, inliers, count, 5);
+            assert!(miss_probability::<f64>(n, inliers, count, 5) <= 0.001 + 1e-12);
+            if n > 1 {
+                assert!(miss_probability::<f64>(n - 2, inliers, count, 5) > 0.001);
+            }
+            let single = iterations_needed(0.999f32, inliers, count, 5) as f64;
+            assert!((single / n as f64 - 1.0).abs() < 1e-3 || single - n as f64 <= 1.0, "{single} {n}");
+        }
+        assert_eq!(iterations_needed(0.999f32, 4, 100, 5), u32::MAX);
+    }
+
+    #[test]
+    fn the_tail_bound_holds() {
+        // P(B >= 8) for B(10, 1/2) = 56 / 1024.
+        let bound = log_binomial_tail(10, 8, 0.5f64);
+        assert!(bound >= (56.0f64 / 1024.0).ln() && bound < (0.2f64).ln());
+        assert_eq!(log_binomial_tail(10, 5, 0.5f64), 0.0);
+    }
+
+    #[test]
+    fn the_excluded_ratio_is_the_least_detected() {
+        let ratio: f64 = undetected_inlier_ratio(0.999, 1000, 200, 5);
+        let k = (ratio * 200.0).round() as u32;
+        assert!(iterations_needed(0.999, k, 200, 5) <= 1000);
+        assert!(iterations_needed(0.999, k - 1, 200, 5) > 1000);
+    }
+}
