@@ -2,6 +2,7 @@
 
 use std::slice;
 
+use epipole::geometry::{Essential, Pose};
 use epipole::nalgebra::{Matrix3, Vector3};
 use epipole::{Real, solvers};
 
@@ -25,6 +26,23 @@ unsafe fn put<T: Real>(out: *mut T, matrices: impl IntoIterator<Item = Matrix3<T
         for (k, v) in m.transpose().iter().enumerate() {
             // SAFETY: as the caller promises.
             unsafe { *out.add(9 * count + k) = *v };
+        }
+        count += 1;
+    }
+    count as i32
+}
+
+/// Writes poses, a row-major rotation matrix and the translation each, one after the other; how many there were.
+///
+/// # Safety
+/// `out` has room for all of them.
+unsafe fn put_poses<T: Real>(out: *mut T, poses: impl IntoIterator<Item = Pose<T>>) -> i32 {
+    let mut count = 0;
+    for pose in poses {
+        let r = pose.rotation.to_rotation_matrix().into_inner().transpose();
+        for (k, v) in r.iter().chain(pose.translation.vector.iter()).enumerate() {
+            // SAFETY: as the caller promises.
+            unsafe { *out.add(12 * count + k) = *v };
         }
         count += 1;
     }
@@ -55,9 +73,27 @@ macro_rules! export {
 
 export! {
     bench_5pt_f32 bench_5pt_f64: relpose_5pt;
+    bench_5ptpose_f32 bench_5ptpose_f64: relpose_5pt_poses;
+    bench_edecomp_f32 bench_edecomp_f64: pose_by_cheirality;
 }
 
 unsafe fn relpose_5pt<T: Real>(a: *const T, b: *const T, out: *mut T) -> i32 {
     // SAFETY: five bearings each, at most ten solutions.
     unsafe { put(out, solvers::relpose_5pt(&bearings(a), &bearings(b)).into_iter().map(|e| e.0)) }
+}
+
+unsafe fn relpose_5pt_poses<T: Real>(a: *const T, b: *const T, out: *mut T) -> i32 {
+    // SAFETY: five bearings each, at most ten solutions.
+    unsafe { put_poses(out, solvers::relpose_5pt_poses(&bearings(a), &bearings(b))) }
+}
+
+/// An essential matrix, row-major, and five bearings of each view, to the pose that has all of them in front.
+unsafe fn pose_by_cheirality<T: Real>(a: *const T, b: *const T, out: *mut T) -> i32 {
+    // SAFETY: as the caller promises.
+    let (e, x1, x2) =
+        unsafe { (slice::from_raw_parts(a, 9), bearings::<T, 5>(b), bearings::<T, 5>(b.add(15))) };
+    let e = Essential(Matrix3::from_row_slice(e));
+    let pose = e.pose_by_cheirality(&x1, &x2).filter(|p| p.in_front == 5).map(|p| p.pose);
+    // SAFETY: at most one pose.
+    unsafe { put_poses(out, pose) }
 }
