@@ -4,10 +4,10 @@ use nalgebra::Vector2;
 
 use super::workspace::TwoViewWorkspace;
 use crate::geometry::CameraModel;
+use crate::linalg::LANES;
 use crate::real::{is_finite, lit};
 use crate::refine::blocks::{BearingBlock, Block, PlaneBlock};
 use crate::refine::relative_pose::Scales;
-use crate::robust::LANES;
 use crate::{InputError, Real};
 
 /// Checks two lists of pixels against each other, the minimal number and the capacity.

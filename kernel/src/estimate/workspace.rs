@@ -100,7 +100,7 @@ impl<'a, T: Real> TwoViewWorkspace<'a, T> {
 
     pub(super) fn capacity_of<B: Block<T>>(&self) -> usize {
         let numbers = B::slice(self.numbers).len() * 4;
-        numbers.min(self.order.len()).min(self.inliers.len())
+        [numbers, self.order.len(), self.inliers.len()].into_iter().fold(usize::MAX, core::cmp::min)
     }
 
     /// The inlier mask of the last estimate, one entry a correspondence; empty before the first.

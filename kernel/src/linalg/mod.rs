@@ -6,6 +6,7 @@ use crate::Real;
 use crate::real::{abs, is_finite, max};
 
 mod eigen;
+mod lanes;
 mod ldlt;
 mod lu;
 mod null_space;
@@ -14,6 +15,7 @@ mod row_qr;
 mod svd3;
 
 pub use eigen::{SymmetricEigen, symmetric_eigen};
+pub use lanes::{LANES, Lanes};
 pub use ldlt::Ldlt;
 pub use lu::Lu;
 pub use null_space::null_space;

@@ -7,7 +7,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::Real;
-use crate::robust::{LANES, Lanes};
+use crate::linalg::{LANES, Lanes};
 
 /// Some numbers of each of four correspondences, side by side.
 pub(crate) trait Block<T: Real>: Copy {

@@ -4,9 +4,9 @@ use nalgebra::{Matrix3, SMatrix, SVector};
 
 use super::blocks::{BlockSlice, EpipolarBlock};
 use crate::Real;
-use crate::linalg::Ldlt;
+use crate::linalg::{LANES, Lanes, Ldlt};
 use crate::real::{from_u32, lit};
-use crate::robust::{LANES, Lanes, Loss};
+use crate::robust::loss::Loss;
 
 /// A model whose epipolar matrix depends on `P` local parameters.
 pub(crate) trait Manifold<T: Real, const P: usize>: Copy {

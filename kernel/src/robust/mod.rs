@@ -6,7 +6,7 @@
 
 pub(crate) mod budget;
 mod estimator;
-mod loss;
+pub mod loss;
 mod rank;
 mod ransac;
 mod sampler;
@@ -15,11 +15,10 @@ mod stopping;
 
 pub use budget::{Budget, Guide, OptionsError, Progress, RansacOptions, RansacReport, StopReason};
 pub use estimator::{Estimator, ScoreCounts};
-pub use loss::Loss;
 pub use rank::rank_by_score;
 pub use ransac::{Consensus, KEPT, ransac};
 pub use sampler::Sampler;
-pub use score::{Gate, LANES, Lanes, Score, Tally};
+pub use score::{Gate, Score, Tally};
 pub use stopping::{
     iterations_needed, log_binomial_tail, miss_probability, probability_of_inlier_sample,
     undetected_inlier_ratio,

@@ -5,7 +5,7 @@ use crate::Real;
 /// Fills `order` with 0, 1, ... sorted by rising score; equal scores keep the order of their indices, NaN goes last.
 /// As many entries are used as both slices have. Heap sort: no allocation, at most about 2 n log2 n steps.
 pub fn rank_by_score<T: Real>(scores: &[T], order: &mut [u32]) {
-    let n = scores.len().min(order.len());
+    let n = core::cmp::min(scores.len(), order.len());
     let Some(order) = order.get_mut(..n) else { return };
     for (entry, i) in order.iter_mut().zip(0u32..) {
         *entry = i;

@@ -56,7 +56,7 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
     let mut stop = StopReason::MaxIterations;
 
     while spent.iterations < budget.max_iterations {
-        if spent.iterations >= max_u32(needed, options.min_iterations) {
+        if spent.iterations >= core::cmp::max(needed, options.min_iterations) {
             stop = StopReason::Confident;
             break;
         }
@@ -119,7 +119,7 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
         if leads {
             spent.inliers = candidate.1.inliers;
             needed = iterations_needed(options.confidence, spent.inliers, count, size);
-            gate = self::gate(minimal_cost, max_u32(least_inliers, spent.inliers), count, &counts);
+            gate = self::gate(minimal_cost, core::cmp::max(least_inliers, spent.inliers), count, &counts);
         }
     }
 
@@ -138,10 +138,6 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
     }
 }
 
-fn max_u32(a: u32, b: u32) -> u32 {
-    if a > b { a } else { b }
-}
-
 /// The sequential test between `inliers` of `count` and the share of inliers that rejected models had so far.
 fn gate<T: Real>(bound: T, inliers: u32, count: u32, counts: &ScoreCounts) -> Gate<T> {
     let ratio = |a: u64, b: u64| lit::<T>(a as f64) / lit::<T>(b as f64);
@@ -151,7 +147,7 @@ fn gate<T: Real>(bound: T, inliers: u32, count: u32, counts: &ScoreCounts) -> Ga
     } else {
         min(ratio(counts.rejected_inliers, counts.rejected_residuals), lit(0.5))
     };
-    Gate::new(bound, ratio(inliers as u64, max_u32(count, 1) as u64), max(bad, lit(0.01)))
+    Gate::new(bound, ratio(inliers as u64, core::cmp::max(count, 1) as u64), max(bad, lit(0.01)))
 }
 
 /// Inserts a model by its cost; the worst falls off.

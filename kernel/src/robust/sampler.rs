@@ -61,7 +61,7 @@ impl<T: Real> Sampler<T> {
     #[must_use]
     pub fn ranked(seed: u64, count: u32, sample_size: u32) -> Self {
         let mut samples = lit::<T>(GROWTH_SAMPLES);
-        for i in 0..sample_size.min(count).min(16) {
+        for i in 0..smallest([sample_size, count, 16]) {
             samples *= from_u32::<T>(sample_size - i) / from_u32::<T>(count - i);
         }
         let growth = (count > sample_size).then_some(Growth { pool: sample_size, samples, until: T::ONE });
@@ -84,7 +84,7 @@ impl<T: Real> Sampler<T> {
             // and only the first few shares are smaller than one sample.
             if from_u32::<T>(iteration) >= growth.until && growth.pool < self.count {
                 let grown = growth.samples * from_u32::<T>(growth.pool + 1)
-                    / from_u32::<T>(growth.pool + 1 - (S as u32).min(growth.pool));
+                    / from_u32::<T>(growth.pool + 1 - smallest([S as u32, growth.pool]));
                 growth.until += crate::real::max(grown - growth.samples, T::ONE);
                 growth.samples = grown;
                 growth.pool += 1;
@@ -112,6 +112,10 @@ impl<T: Real> Sampler<T> {
         }
         Some(chosen)
     }
+}
+
+fn smallest<const N: usize>(numbers: [u32; N]) -> u32 {
+    numbers.into_iter().fold(u32::MAX, core::cmp::min)
 }
 
 /// Puts `value` into a rising list; the last entry falls off.

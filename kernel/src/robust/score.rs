@@ -1,13 +1,8 @@
 //! The truncated quadratic (MSAC) score, summed in four fixed lanes with early exit.
 
 use crate::Real;
+use crate::linalg::{LANES, Lanes};
 use crate::real::{lit, ln};
-
-/// Correspondences worked on side by side. Fixed in the source, so that sums run in the same order on every target.
-pub const LANES: usize = 4;
-
-/// One number a lane.
-pub type Lanes<T> = [T; LANES];
 
 /// How well a model explains all correspondences.
 #[derive(Clone, Copy, Debug, PartialEq)]

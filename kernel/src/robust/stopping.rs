@@ -16,7 +16,7 @@ pub fn probability_of_inlier_sample<T: Real>(inliers: u32, count: u32, sample_si
         return T::ZERO;
     }
     let mut p = T::ONE;
-    for i in 0..sample_size.min(16) {
+    for i in 0..core::cmp::min(sample_size, 16) {
         p *= from_u32::<T>(inliers - i) / from_u32::<T>(count - i);
     }
     p
@@ -77,7 +77,7 @@ pub fn undetected_inlier_ratio<T: Real>(confidence: T, iterations: u32, count: u
             low = middle;
         }
     }
-    from_u32::<T>(high) / from_u32::<T>(count.max(1))
+    from_u32::<T>(high) / from_u32::<T>(core::cmp::max(count, 1))
 }
 
 /// An upper bound of `ln P(B >= k)` for a binomial `B` of `n` trials with success probability `p`, by Hoeffding's

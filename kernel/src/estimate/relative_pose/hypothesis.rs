@@ -4,11 +4,13 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::Real;
 use crate::geometry::Essential;
+use crate::linalg::{LANES, Lanes};
 use crate::real::{abs, lit, sqrt};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock, in_front};
 use crate::refine::lm::{Manifold, minimise};
 use crate::refine::relative_pose::{PoseModel, Scales};
-use crate::robust::{Estimator, Gate, LANES, Lanes, Loss, Score, ScoreCounts, Tally};
+use crate::robust::loss::Loss;
+use crate::robust::{Estimator, Gate, Score, ScoreCounts, Tally};
 use crate::solvers::relpose_5pt;
 
 /// Correspondences and what a score of them needs.
@@ -100,7 +102,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         let view = self.view(model);
         let mut left = self.data.count;
         for block in self.data.blocks {
-            each(block, &self.squared_in_front(block, model, &view), left.min(LANES));
+            each(block, &self.squared_in_front(block, model, &view), core::cmp::min(left, LANES));
             left = left.saturating_sub(LANES);
         }
     }

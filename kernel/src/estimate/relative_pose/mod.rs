@@ -7,11 +7,12 @@ use nalgebra::Vector2;
 use super::load::{Units, check_pixels, load_bearings, load_planes};
 use super::workspace::RelativePoseWorkspace;
 use crate::geometry::CameraModel;
-use crate::linalg::Ldlt;
+use crate::linalg::{LANES, Ldlt};
 use crate::real::{from_u32, lit, max, sqrt};
 use crate::refine::blocks::{BearingBlock, BlockSlice, EpipolarBlock, PlaneBlock};
 use crate::robust::budget::check_noise;
-use crate::robust::{Guide, LANES, Loss, OptionsError, RansacOptions, rank_by_score, ransac};
+use crate::robust::loss::Loss;
+use crate::robust::{Guide, OptionsError, RansacOptions, rank_by_score, ransac};
 use crate::{InputError, Real};
 
 mod hypothesis;
@@ -188,7 +189,7 @@ fn estimate<T: Real, B: EpipolarBlock<T>>(
         }
     });
     let sums = &minimum.equations;
-    let freedom = from_u32::<T>(sums.active.saturating_sub(5).max(1));
+    let freedom = from_u32::<T>(sums.active.saturating_sub(6) + 1);
     let outside = from_u32::<T>((count as u32).saturating_sub(sums.active));
     let squares = sums.cost - outside * problem.threshold * problem.threshold;
     let variance = max(squares, T::ZERO) / freedom;
