@@ -8,9 +8,11 @@ mod homography;
 pub mod pose;
 pub mod residual;
 pub mod triangulation;
+mod whitening;
 
 pub use camera::{BrownConrady, Camera, CameraError, CameraModel, KannalaBrandt, Pinhole, UnprojectError};
 pub use essential::{CheiralPose, Essential, TwistedPair};
 pub use fundamental::Fundamental;
 pub use homography::Homography;
 pub use pose::Pose;
+pub(crate) use whitening::Whitening;

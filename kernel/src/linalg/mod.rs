@@ -5,6 +5,7 @@ use nalgebra::SMatrix;
 use crate::Real;
 use crate::real::{abs, is_finite, max};
 
+mod cubic;
 mod eigen;
 mod lanes;
 mod ldlt;
@@ -14,6 +15,7 @@ pub mod poly;
 mod row_qr;
 mod svd3;
 
+pub use cubic::{cubic_roots, quadratic_roots};
 pub use eigen::{SymmetricEigen, symmetric_eigen};
 pub use lanes::{LANES, Lanes};
 pub use ldlt::Ldlt;
