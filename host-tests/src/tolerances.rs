@@ -54,6 +54,9 @@ table! {
     TRIANGULATED: 5e-4, 1e-9,
         "relative distance of noise-free points at a parallax above 0.01 rad; EPSILON over the parallax, for f32 of \
          inputs rounded before";
-    NEAREST_POINT: 1e-5, 1e-11,
-        "relative distance of two ways to compute the same point at a parallax above 0.01 rad";
+    LINEARISED_IMAGE: 7e-4, 2e-4,
+        "relative distance of points; the image curved over an error of 0.5 px, squared in radians, over the parallax";
+    DLT_ORIGIN: 1e-3, 1e-3,
+        "relative distance of points; the DLT weighs a point by its distance from the origin, so views exchanged at a \
+         noise of 0.5 px are not quite alike";
 }

@@ -127,9 +127,10 @@ impl<T: Real> ViewPair<T> {
     /// The verdict on a point with the signs of its depths along the two bearings.
     #[inline]
     fn judge(&self, point: Vector3<T>, depth1: T, depth2: T) -> Triangulation<T> {
-        // The sum is finite only where every term is.
+        // The sum is finite only where every term is; a smaller depth has lost digits to underflow.
         let size = abs(point.x) + abs(point.y) + abs(point.z);
-        if depth1 > T::ZERO && depth2 > T::ZERO && size <= T::MAX {
+        let least = T::MIN_POSITIVE / T::EPSILON;
+        if depth1 >= least && depth2 >= least && size <= T::MAX {
             Triangulation::Point(point)
         } else {
             self.judge_behind(point, depth1, depth2)

@@ -9,7 +9,7 @@ use super::covariance::from_factor;
 use crate::geometry::residual::{reprojection, reprojection_with_jacobians};
 use crate::geometry::{CameraModel, Pose};
 use crate::linalg::RowQr;
-use crate::real::{abs, is_finite, lit, max};
+use crate::real::{abs, is_finite, lit, max, sqrt};
 use crate::{InputError, Real};
 
 /// Evaluations of all residuals at the most, steps and halved steps together.
@@ -36,7 +36,7 @@ impl<T: Real, C: ?Sized> Copy for View<'_, T, C> {}
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[must_use]
 pub struct RefinedPoint<T: Real> {
-    /// The point in the world, seen by every view. Its cost is never above the start's.
+    /// The point in the world, seen by every view. Its cost is not above the start's, but for rounding.
     pub point: Vector3<T>,
     /// The sum of squared pixel residuals.
     pub cost_px_sq: T,
@@ -152,12 +152,16 @@ pub fn refine_point<T: Real, C: CameraModel<T> + ?Sized>(
     let mut converged = false;
     let mut evaluations = 0;
     for _ in 0..MAX_EVALUATIONS {
-        if best.predicted <= floor + T::EPSILON * best.cost {
-            converged = true;
+        // An error d of a residual r is an error 2 r d of its square: what the cost itself is known to.
+        converged = best.predicted <= floor + sqrt(floor * best.cost);
+        evaluations += 1;
+        let trial = linearise(views, pixels, &(best.point + step));
+        if converged {
+            // The last step, which the cost no longer shows.
+            best = trial.filter(|trial| trial.predicted < best.predicted).unwrap_or(best);
             break;
         }
-        evaluations += 1;
-        let trial = linearise(views, pixels, &(best.point + step)).filter(|trial| trial.cost < best.cost);
+        let trial = trial.filter(|trial| trial.cost < best.cost);
         match trial.and_then(|trial| Some((trial, trial.step()?))) {
             Some(lower) => (best, step) = lower,
             None => step *= T::HALF,
