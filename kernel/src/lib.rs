@@ -5,6 +5,7 @@
 
 pub use nalgebra;
 
+pub mod bundle;
 pub mod estimate;
 pub mod geometry;
 pub mod linalg;

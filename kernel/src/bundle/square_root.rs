@@ -1,0 +1,150 @@
+//! The window's problem in square-root form: constraints and points folded into one triangular factor over the frames.
+//! Marginalisation and covariances are read off it.
+
+use super::constraint::At;
+use super::memory::{FrameSlot, NO_SLOT, ObservationSlot, PointSlot, system_len};
+use super::qr::{insert, packed_len, rotate, row_scale};
+use super::residual::{linearise, residual};
+use super::small::cross;
+use crate::Real;
+use crate::real::sqrt;
+use crate::robust::Loss;
+
+/// A packed factor over the frames' column blocks in the memory of the linear system, and a point's rows above it.
+pub(super) struct SquareRoot<'a, T> {
+    /// Unknowns of the frames.
+    pub(super) n: usize,
+    pub(super) factor: &'a mut [T],
+    /// The point's three rows: its own columns first, then the frames', then the right-hand side.
+    pub(super) lead: [&'a mut [T]; 3],
+    row: &'a mut [T],
+    /// A row of the constraints.
+    pub(super) constraint: &'a mut [T],
+    pub(super) prior: &'a mut [T],
+}
+
+impl<'a, T: Real> SquareRoot<'a, T> {
+    /// An empty factor over `used` column blocks in the scalars of a window with the capacity `frames`.
+    pub(super) fn of(scalars: &'a mut [T], frames: usize, used: usize) -> Option<Self> {
+        let n = 6 * used;
+        let (system, prior) = scalars.split_at_mut_checked(system_len(frames))?;
+        let (factor, vectors) = system.split_at_mut_checked(18 * frames * (frames + 1))?;
+        // The factor is shorter than the triangle of blocks by more than a row of the constraints.
+        let (factor, rest) = factor.split_at_mut_checked(packed_len(n))?;
+        let (constraint, _) = rest.split_at_mut_checked(n)?;
+        let (row, vectors) = vectors.split_at_mut_checked(n + 4)?;
+        let (a, vectors) = vectors.split_at_mut_checked(n + 4)?;
+        let (b, vectors) = vectors.split_at_mut_checked(n + 4)?;
+        let (c, _) = vectors.split_at_mut_checked(n + 4)?;
+        factor.fill(T::ZERO);
+        Some(Self { n, factor, lead: [a, b, c], row, constraint, prior })
+    }
+
+    /// Folds in a row of the constraints, with its residual.
+    pub(super) fn insert_row(&mut self, j: &[T], r: T) {
+        let Some((_, row)) = self.row.split_at_mut_checked(3) else { return };
+        for (to, &from) in row.iter_mut().zip(j.iter().chain(core::iter::once(&r))) {
+            *to = from;
+        }
+        let scale = row_scale(j);
+        insert(self.factor, self.n, row, scale);
+    }
+
+    /// Folds in the observations of a point. Afterwards `lead` holds the rows that determine the point itself: leaving
+    /// them aside marginalises it.
+    pub(super) fn insert_point(
+        &mut self,
+        frames: &[FrameSlot<T>],
+        point: &PointSlot<T>,
+        group: &[ObservationSlot<T>],
+        loss: &Loss<T>,
+        at: At,
+    ) {
+        for lead in &mut self.lead {
+            lead.fill(T::ZERO);
+        }
+        for o in group {
+            let Some(frame) = frames.get(o.frame as usize) else { continue };
+            let Some(camera) = &frame.camera else { continue };
+            let place = if frame.slot == NO_SLOT { &frame.pose } else { frame.at(at) };
+            let (Some(now), Some(l)) = (
+                residual(camera, &frame.pose, &point.position, o),
+                linearise(camera, place, &point.position, o, loss),
+            ) else {
+                continue;
+            };
+            let e = frame.pose.motion_from(place);
+            let weight = sqrt(loss.evaluate(now[0] * now[0] + now[1] * now[1]).1);
+            for ((d, b), r) in l.d.iter().zip(&l.b).zip(now) {
+                let turn = cross(&l.y, d);
+                let j = [turn[0], turn[1], turn[2], d[0], d[1], d[2]].map(|x| x * weight);
+                // The residual where the Jacobian was taken.
+                let mut r = r * weight;
+                for k in 0..6 {
+                    r -= j[k] * e[k];
+                }
+                self.row.fill(T::ZERO);
+                if let Some(last) = self.row.get_mut(self.n + 3) {
+                    *last = r;
+                }
+                let Some((own, others)) = self.row.split_at_mut_checked(3) else { return };
+                if !point.fixed {
+                    for (to, &from) in own.iter_mut().zip(b) {
+                        *to = from * weight;
+                    }
+                }
+                if let Some(block) = others.as_chunks_mut::<6>().0.get_mut(frame.slot as usize)
+                    && frame.slot != NO_SLOT
+                {
+                    *block = j;
+                }
+                let jacobian = self.row.split_last().map_or(&[][..], |(_, j)| j);
+                self.fold_row(row_scale(jacobian));
+            }
+        }
+    }
+
+    fn fold_row(&mut self, scale: T) {
+        let mut row = &mut *self.row;
+        for (k, lead) in self.lead.iter_mut().enumerate() {
+            let Some((_, lead)) = lead.split_at_mut_checked(k) else { return };
+            rotate(lead, row, scale * T::EPSILON);
+            let Some((_, shorter)) = row.split_first_mut() else { return };
+            row = shorter;
+        }
+        insert(self.factor, self.n, row, scale);
+    }
+
+    /// `t` becomes `t R^-1` for a row `t` over the frames. False where an unknown of the frames is not determined.
+    pub(super) fn solve_row(factor: &[T], n: usize, t: &mut [T], floor: T) -> bool {
+        let mut t = t;
+        for row in super::qr::packed_rows(factor, n) {
+            let Some((head, tail)) = t.split_first_mut() else { return false };
+            let (Some(&pivot), Some(rest)) = (row.first(), row.get(1..)) else { return false };
+            if *head != T::ZERO {
+                if !(crate::real::abs(pivot) > floor) {
+                    return false;
+                }
+                *head /= pivot;
+                let x = *head;
+                for (to, &r) in tail.iter_mut().zip(rest) {
+                    *to -= x * r;
+                }
+            }
+            t = tail;
+        }
+        true
+    }
+
+    /// The length of each of the last six columns.
+    pub(super) fn last_columns(&self) -> [T; 6] {
+        let mut squares = [T::ZERO; 6];
+        for row in super::qr::packed_rows(self.factor, self.n) {
+            // The last element is the right-hand side.
+            for (square, &x) in squares.iter_mut().rev().zip(row.iter().rev().skip(1)) {
+                *square += x * x;
+            }
+        }
+        squares.map(sqrt)
+    }
+}
