@@ -6,6 +6,7 @@
 //!
 //! A failing case prints its seed; `EPIPOLE_SEED=<seed> cargo test -p epipole-host-tests <test>` runs that case alone.
 
+pub mod bundle;
 pub mod cases;
 pub mod matchers;
 pub mod oracle;

@@ -112,11 +112,7 @@ impl<T: Real> Window<'_, T> {
     ///
     /// # Errors
     /// [`BundleError::StalePoint`].
-    pub fn point_report(
-        &self,
-        point: PointHandle,
-        outlier_sigma: T,
-    ) -> Result<PointReport<T>, BundleError> {
+    pub fn point_report(&self, point: PointHandle, outlier_sigma: T) -> Result<PointReport<T>, BundleError> {
         let position = &self.point(point).map_err(|_| BundleError::StalePoint)?.position;
         let mut report = PointReport { observations: 0, outliers: 0, behind: 0, rms_sigma: T::ZERO };
         let mut sum = T::ZERO;
@@ -197,6 +193,7 @@ impl<T: Real> Window<'_, T> {
             system,
             prior_frames: self.header.prior_frames,
             loss: options.loss,
+            curved: false,
             free: points,
         };
         let mut damping = options.initial_damping;
@@ -227,7 +224,8 @@ impl<T: Real> Window<'_, T> {
             if report.iterations >= options.max_iterations {
                 break Termination::IterationLimit;
             }
-            let after = report.evaluations.saturating_add(observed.saturating_mul(if current { 2 } else { 3 }));
+            let after =
+                report.evaluations.saturating_add(observed.saturating_mul(if current { 2 } else { 3 }));
             if after > options.max_evaluations {
                 break Termination::BudgetSpent;
             }
@@ -252,6 +250,7 @@ impl<T: Real> Window<'_, T> {
                     if -change <= small {
                         break Termination::Converged;
                     }
+                    problem.curved = -change <= lit::<T>(CURVED) * cost;
                     let x = T::TWO * gain - T::ONE;
                     let shrink = max(T::ONE / lit(3.0), T::ONE - x * x * x);
                     damping = max(damping * shrink, least_damping);
@@ -263,6 +262,7 @@ impl<T: Real> Window<'_, T> {
                     break Termination::Converged;
                 }
             }
+            problem.curved = false;
             damping *= growth;
             growth *= T::TWO;
             if !(damping < lit(1e10)) {
@@ -292,6 +292,8 @@ impl<T: Real> Window<'_, T> {
     }
 }
 
+const CURVED: f64 = 1e-3;
+
 /// The window's slices while it is optimised.
 struct Problem<'a, T: Real> {
     frames: &'a mut [FrameSlot<T>],
@@ -300,6 +302,8 @@ struct Problem<'a, T: Real> {
     system: System<'a, T>,
     prior_frames: usize,
     loss: Loss<T>,
+    /// The next steps take the curvature of the loss into account.
+    curved: bool,
     free: Points,
 }
 
@@ -330,6 +334,7 @@ impl<T: Real> Problem<'_, T> {
             self.observations,
             &mut self.system,
             &self.loss,
+            self.curved,
             self.free,
             damping,
         );
@@ -375,6 +380,7 @@ impl<T: Real> Problem<'_, T> {
             self.observations,
             system.step,
             &self.loss,
+            self.curved,
             self.free,
             damping,
         );

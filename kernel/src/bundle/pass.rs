@@ -80,6 +80,7 @@ pub(super) fn build<T: Real>(
     observations: &[ObservationSlot<T>],
     system: &mut System<'_, T>,
     loss: &Loss<T>,
+    curved: bool,
     free: Points,
     lambda: T,
 ) -> Built<T> {
@@ -97,7 +98,7 @@ pub(super) fn build<T: Real>(
             if !is_free && frame.slot == NO_SLOT {
                 continue;
             }
-            let Some(l) = linearise(camera, &frame.pose, &point.position, o, loss) else {
+            let Some(l) = linearise(camera, &frame.pose, &point.position, o, loss, curved) else {
                 built.behind += 1;
                 continue;
             };
@@ -185,6 +186,7 @@ pub(super) fn back_substitute<T: Real>(
     observations: &[ObservationSlot<T>],
     step: &[[T; 6]],
     loss: &Loss<T>,
+    curved: bool,
     free: Points,
     lambda: T,
 ) -> Tried<T> {
@@ -208,7 +210,7 @@ pub(super) fn back_substitute<T: Real>(
                 }
                 continue;
             }
-            let Some(l) = linearise(camera, &frame.pose, &point.position, o, loss) else {
+            let Some(l) = linearise(camera, &frame.pose, &point.position, o, loss, curved) else {
                 all_seen = false;
                 continue;
             };

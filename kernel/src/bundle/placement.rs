@@ -24,11 +24,7 @@ impl<T: Real> Placement<T> {
     pub(super) const IDENTITY: Self = Self {
         quaternion: [T::ONE, T::ZERO, T::ZERO, T::ZERO],
         centre: [T::ZERO; 3],
-        rotation: [
-            [T::ONE, T::ZERO, T::ZERO],
-            [T::ZERO, T::ONE, T::ZERO],
-            [T::ZERO, T::ZERO, T::ONE],
-        ],
+        rotation: [[T::ONE, T::ZERO, T::ZERO], [T::ZERO, T::ONE, T::ZERO], [T::ZERO, T::ZERO, T::ONE]],
     };
 
     fn new(q: [T; 4], centre: V3<T>) -> Self {

@@ -47,6 +47,7 @@ pub(super) fn linearise<T: Real>(
     x: &V3<T>,
     o: &ObservationSlot<T>,
     loss: &Loss<T>,
+    curved: bool,
 ) -> Option<Linear<T>> {
     let y = at.to_camera(x);
     let (pixel, j) = camera.project_with_jacobian(&Vector3::from(y))?;
@@ -58,7 +59,7 @@ pub(super) fn linearise<T: Real>(
     let b = [row(&d[0]), row(&d[1])];
     let squared = r[0] * r[0] + r[1] * r[1];
     let (rho, weight) = loss.evaluate(squared);
-    Some(Linear { y, r, d, b, weight, bend: bend(loss, squared), rho })
+    Some(Linear { y, r, d, b, weight, bend: if curved { bend(loss, squared) } else { T::ZERO }, rho })
 }
 
 /// Twice the loss's second derivative over its first, with the sign turned and at most what leaves the weight matrix
@@ -67,7 +68,7 @@ pub(super) fn linearise<T: Real>(
 #[inline(always)]
 fn bend<T: Real>(loss: &Loss<T>, squared: T) -> T {
     match *loss {
-        Loss::Huber(k) if squared > k * k => T::ONE / squared,
+        Loss::Huber(k) if squared > k * k => crate::real::lit::<T>(0.75) / squared,
         _ => T::ZERO,
     }
 }
@@ -84,11 +85,8 @@ impl<T: Real> Linear<T> {
     #[inline(always)]
     pub(super) fn weighted_b(&self) -> [V3<T>; 2] {
         let b = &self.b;
-        let columns = [
-            self.weigh([b[0][0], b[1][0]]),
-            self.weigh([b[0][1], b[1][1]]),
-            self.weigh([b[0][2], b[1][2]]),
-        ];
+        let columns =
+            [self.weigh([b[0][0], b[1][0]]), self.weigh([b[0][1], b[1][1]]), self.weigh([b[0][2], b[1][2]])];
         [[columns[0][0], columns[1][0], columns[2][0]], [columns[0][1], columns[1][1], columns[2][1]]]
     }
 
@@ -132,10 +130,6 @@ impl<T: Real> Linear<T> {
     pub(super) fn gradient(&self) -> V3<T> {
         let g = [self.weight * self.r[0], self.weight * self.r[1]];
         let d = &self.d;
-        [
-            d[0][0] * g[0] + d[1][0] * g[1],
-            d[0][1] * g[0] + d[1][1] * g[1],
-            d[0][2] * g[0] + d[1][2] * g[1],
-        ]
+        [d[0][0] * g[0] + d[1][0] * g[1], d[0][1] * g[0] + d[1][1] * g[1], d[0][2] * g[0] + d[1][2] * g[1]]
     }
 }

@@ -69,7 +69,7 @@ impl<'a, T: Real> SquareRoot<'a, T> {
             let place = if frame.slot == NO_SLOT { &frame.pose } else { frame.at(at) };
             let (Some(now), Some(l)) = (
                 residual(camera, &frame.pose, &point.position, o),
-                linearise(camera, place, &point.position, o, loss),
+                linearise(camera, place, &point.position, o, loss, false),
             ) else {
                 continue;
             };

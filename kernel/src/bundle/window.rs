@@ -6,8 +6,8 @@ use nalgebra::{Vector2, Vector3};
 
 use super::constraint::PosePrior;
 use super::memory::{
-    Distance, FrameHandle, FrameSlot, NO_SLOT, ObservationSlot, PointHandle, PointSlot, WindowHeader,
-    WindowMemory, key, scalars_len,
+    Distance, FrameHandle, FrameSlot, ObservationSlot, PointHandle, PointSlot, WindowHeader, WindowMemory,
+    key, scalars_len,
 };
 use super::placement::Placement;
 use super::small::{dot, sub};

@@ -1,0 +1,42 @@
+//! Windows for tests and measurements: memory by run-time capacities, problems from files, synthetic flights.
+
+pub mod problem;
+
+use epipole::Real;
+use epipole::bundle::{
+    FrameSlot, ObservationSlot, PointSlot, Window, WindowHeader, WindowMemory, scalars_len,
+};
+
+/// A window's memory on the heap.
+pub struct HeapWindow<T: Real> {
+    header: WindowHeader,
+    frames: Vec<FrameSlot<T>>,
+    points: Vec<PointSlot<T>>,
+    observations: Vec<ObservationSlot<T>>,
+    scalars: Vec<T>,
+}
+
+impl<T: Real> HeapWindow<T> {
+    /// Memory of these capacities.
+    pub fn new(frames: usize, points: usize, observations: usize) -> Self {
+        Self {
+            header: WindowHeader::EMPTY,
+            frames: vec![FrameSlot::EMPTY; frames],
+            points: vec![PointSlot::EMPTY; points],
+            observations: vec![ObservationSlot::EMPTY; observations],
+            scalars: vec![T::ZERO; scalars_len(frames)],
+        }
+    }
+
+    /// The window over it, as it was left.
+    pub fn window(&mut self) -> Window<'_, T> {
+        Window::new(WindowMemory {
+            header: &mut self.header,
+            frames: &mut self.frames,
+            points: &mut self.points,
+            observations: &mut self.observations,
+            scalars: &mut self.scalars,
+        })
+        .expect("the memory fits")
+    }
+}
