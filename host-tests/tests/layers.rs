@@ -13,8 +13,8 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("geometry", &["real", "error", "solutions", "linalg"]),
     ("solvers", &["real", "error", "solutions", "linalg", "geometry"]),
     ("robust", &["real", "error", "solutions", "linalg", "geometry"]),
-    ("refine", &["real", "error", "solutions", "linalg", "geometry", "robust::loss", "robust::Loss"]),
-    ("bundle", &["real", "error", "solutions", "linalg", "geometry", "robust::loss", "robust::Loss"]),
+    ("refine", &["real", "error", "solutions", "linalg", "geometry", "robust::loss"]),
+    ("bundle", &["real", "error", "solutions", "linalg", "geometry", "robust::loss"]),
     (
         "estimate",
         &["real", "error", "solutions", "linalg", "geometry", "solvers", "robust", "refine", "bundle"],

@@ -8,7 +8,7 @@ use std::path::Path;
 use cpu_time::ThreadTime;
 use epipole::Real;
 use epipole::bundle::BundleOptions;
-use epipole::robust::Loss;
+use epipole::robust::loss::Loss;
 use epipole_host_tests::bundle::HeapWindow;
 use epipole_host_tests::bundle::problem::{Problem, read_back};
 

@@ -9,7 +9,7 @@ use epipole::bundle::{
 use epipole::geometry::{Camera, Pinhole, Pose, pose};
 use epipole::nalgebra::{Matrix3, Vector2, Vector3};
 use epipole::real::lit;
-use epipole::robust::Loss;
+use epipole::robust::loss::Loss;
 
 /// Frames, points and observations in `f64`.
 #[derive(Clone, Debug, Default)]

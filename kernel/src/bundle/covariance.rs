@@ -10,7 +10,7 @@ use super::square_root::SquareRoot;
 use super::{BundleError, Window};
 use crate::Real;
 use crate::real::{abs, max};
-use crate::robust::Loss;
+use crate::robust::loss::Loss;
 
 /// What the window knows of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]

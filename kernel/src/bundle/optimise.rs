@@ -10,7 +10,7 @@ use super::window::contradicts;
 use super::{BundleError, Window};
 use crate::Real;
 use crate::real::{from_u32, is_finite, lit, max, min, sqrt};
-use crate::robust::Loss;
+use crate::robust::loss::Loss;
 
 /// Which frames may move.
 #[derive(Clone, Copy)]

@@ -3,7 +3,7 @@
 use super::BundleError;
 use crate::Real;
 use crate::real::{is_finite, lit, max};
-use crate::robust::Loss;
+use crate::robust::loss::Loss;
 
 /// Which unknowns move. Fixed frames and fixed points never do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]

@@ -6,7 +6,7 @@ use super::residual::{linearise, residual};
 use super::small::{S3, V3, add, cross, dot, inverse_factor, lower, product_transposed, sub, upper};
 use super::system::{System, add_spread, add_spread_vector, block_index};
 use crate::Real;
-use crate::robust::Loss;
+use crate::robust::loss::Loss;
 
 /// The observations, point by point.
 pub(super) struct Groups<'a, T: Real>(pub(super) &'a [ObservationSlot<T>]);

@@ -6,7 +6,7 @@ use super::pass::Groups;
 use super::square_root::SquareRoot;
 use super::{Window, WindowError};
 use crate::Real;
-use crate::robust::Loss;
+use crate::robust::loss::Loss;
 
 /// What a marginalisation did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

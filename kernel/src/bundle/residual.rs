@@ -7,7 +7,7 @@ use super::placement::Placement;
 use super::small::{M3, S3, V3};
 use crate::Real;
 use crate::geometry::{Camera, CameraModel};
-use crate::robust::Loss;
+use crate::robust::loss::Loss;
 
 /// An observation linearised: with a motion `(w, v)` of the frame and `dx` of the point, the whitened residual is
 /// `r + d (w x y + v) + b dx`.

@@ -8,7 +8,7 @@ use super::residual::{linearise, residual};
 use super::small::cross;
 use crate::Real;
 use crate::real::sqrt;
-use crate::robust::Loss;
+use crate::robust::loss::Loss;
 
 /// A packed factor over the frames' column blocks in the memory of the linear system, and a point's rows above it.
 pub(super) struct SquareRoot<'a, T> {
