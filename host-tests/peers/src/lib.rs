@@ -3,5 +3,6 @@
 //! A task `bench_<task>_<scalar>(a, b, out)` takes one problem, writes its solutions row-major one after the other and
 //! returns how many there are.
 
+pub mod poses;
 pub mod robust;
 pub mod solvers;

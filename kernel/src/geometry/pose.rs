@@ -287,3 +287,19 @@ pub fn nearest_rotation<T: Real>(m: &Matrix3<T>) -> Option<Matrix3<T>> {
     let unique = s.y + sign * s.z > lit::<T>(16.0) * T::EPSILON * s.x;
     unique.then(|| u * Matrix3::from_diagonal(&Vector3::new(T::ONE, T::ONE, sign)) * v.transpose())
 }
+
+/// The rotation about the y axis by the angle whose cosine and sine are `c` and `s`: `x' = c x + s z`,
+/// `z' = c z - s x`. `(c, s)` must be a unit vector; it is not checked.
+#[inline]
+pub(crate) fn rotation_about_y<T: Real>(c: T, s: T) -> UnitQuaternion<T> {
+    // The half angle's larger component by a square root, the other from the sine.
+    let (w, y) = if c > T::ZERO {
+        let w = sqrt((T::ONE + c) * T::HALF);
+        (w, s * T::HALF / w)
+    } else {
+        let y = sqrt((T::ONE - c) * T::HALF);
+        let y = if s < T::ZERO { -y } else { y };
+        (s * T::HALF / y, y)
+    };
+    UnitQuaternion::new_unchecked(Quaternion::new(w, T::ZERO, y, T::ZERO))
+}

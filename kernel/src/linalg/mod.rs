@@ -6,6 +6,7 @@ use crate::Real;
 use crate::real::{abs, is_finite, max};
 
 mod cubic;
+pub(crate) mod conic;
 mod eigen;
 mod lanes;
 mod ldlt;

@@ -1,0 +1,51 @@
+//! The minimal solvers of absolute and upright pose: `bench_p3p_*`, `bench_up3pt_*`.
+
+use core::slice;
+
+use epipole::Real;
+use epipole::geometry::Pose;
+use epipole::nalgebra::Vector3;
+use epipole::solvers;
+
+/// # Safety
+/// `p` points to `3 * N` numbers.
+unsafe fn vectors<T: Real, const N: usize>(p: *const T) -> [Vector3<T>; N] {
+    let p = unsafe { slice::from_raw_parts(p, 3 * N) };
+    core::array::from_fn(|i| Vector3::new(p[3 * i], p[3 * i + 1], p[3 * i + 2]))
+}
+
+/// Writes R row-major and t of each pose; the count.
+///
+/// # Safety
+/// `out` has room for 12 numbers a pose.
+unsafe fn write_poses<T: Real>(poses: &[Pose<T>], out: *mut T) -> i32 {
+    let out = unsafe { slice::from_raw_parts_mut(out, 12 * poses.len()) };
+    for (pose, out) in poses.iter().zip(out.chunks_exact_mut(12)) {
+        let r = pose.rotation.to_rotation_matrix().into_inner();
+        for i in 0..3 {
+            for j in 0..3 {
+                out[3 * i + j] = r[(i, j)];
+            }
+            out[9 + i] = pose.translation.vector[i];
+        }
+    }
+    poses.len() as i32
+}
+
+macro_rules! export {
+    ($($name:ident, $t:ty, $solver:path;)*) => {$(
+        /// # Safety
+        /// `a` and `b` point to 3x3 numbers, `out` to room for four poses of 12.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $name(a: *const $t, b: *const $t, out: *mut $t) -> i32 {
+            unsafe { write_poses(&$solver(&vectors(a), &vectors(b)), out) }
+        }
+    )*};
+}
+
+export! {
+    bench_p3p_f64, f64, solvers::p3p;
+    bench_p3p_f32, f32, solvers::p3p;
+    bench_up3pt_f64, f64, solvers::relpose_upright_3pt;
+    bench_up3pt_f32, f32, solvers::relpose_upright_3pt;
+}

@@ -1,0 +1,184 @@
+//! P3P: the poses of a calibrated camera that sees three known points.
+//!
+//! `d_i x_i = R X_i + t` with unit bearings `x_i`. The distances alone satisfy, for each pair,
+//! `|d_i x_i - d_j x_j|^2 = |X_i - X_j|^2 =: a_ij`. Two of the three differences that have no constant are conics in
+//! (d0, d1, d2); the degenerate conic of their pencil is two lines, on each of which a quadratic remains.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::geometry::{Pose, pose};
+use crate::linalg::conic::{lines_of_conic, real_root_of_cubic};
+use crate::real::{abs, lit, max, min, sqrt};
+use crate::{Real, Solutions};
+
+/// Newton steps on the three distances.
+const MAX_REFINEMENTS: usize = 4;
+
+/// The up to four poses of a camera that sees three known points along given bearings.
+///
+/// `d_i x_i = R X_i + t` with distances `d_i > 0`, i = 0..2.
+///
+/// # Input
+/// `bearings`: unit vectors in the camera's frame. `points`: the points in the world's frame, in any unit.
+///
+/// # Returns
+/// Poses world to camera, in the unit of the points; 1.7 on average, in no particular order. Empty where there is no
+/// real solution or the input is degenerate.
+///
+/// # Degeneracies
+/// Empty for collinear or coinciding points and for input that is not finite. Near the danger cylinder (the circular
+/// cylinder through the points, camera centre on it) two solutions merge and lose half their digits. Two equal bearings
+/// are admitted: one point hides the other.
+///
+/// # Accuracy
+/// Noise-free, any pose, depth 2 to 20: `f64` 100 % within 1e-6 rad (99th percentile 1e-13); `f32` 99.7 to 99.9 % within
+/// 1e-3 rad, where an exact solver of the rounded input reaches 99.99 %.
+///
+/// # Cost
+/// Two or three steps on a cubic, two quadratics, and for each solution one or two Newton steps of at most four.
+///
+/// # References
+/// Y. Ding, J. Yang, V. Larsson, C. Olsson, K. Astrom, "Revisiting the P3P Problem", CVPR 2023. Here the cubic's best
+/// conditioned root is found without trigonometry, angles enter as chords, which keeps their digits in `f32`, and the
+/// distances are refined on the original equations.
+///
+/// # Examples
+/// ```
+/// use epipole::geometry::Pose;
+/// use epipole::nalgebra::{Point3, Vector3};
+/// use epipole::solvers::p3p;
+/// let truth = Pose::new(Vector3::new(0.1, -0.2, 1.0), Vector3::new(0.0, 0.3, 0.1));
+/// let points = [Vector3::new(1.0, 0.0, 4.0), Vector3::new(-1.0, 0.5, 5.0), Vector3::new(0.2, -1.0, 3.0)];
+/// let bearings = points.map(|p| (truth * Point3::from(p)).coords.normalize());
+/// let poses = p3p(&bearings, &points);
+/// assert!(poses.iter().any(|pose| (pose.to_homogeneous() - truth.to_homogeneous()).norm() < 1e-9));
+/// ```
+pub fn p3p<T: Real>(bearings: &[Vector3<T>; 3], points: &[Vector3<T>; 3]) -> Solutions<Pose<T>, 4> {
+    let mut solutions = Solutions::new();
+    let [x0, x1, x2] = bearings;
+    let [p0, p1, p2] = points;
+    let (f1, f2) = (p1 - p0, p2 - p0);
+    let (a01, a02, a12) = (f1.norm_squared(), f2.norm_squared(), (p2 - p1).norm_squared());
+
+    // 1 - cos of the angle between two bearings: from the chord, it keeps its digits when the angle is small.
+    let u01 = (x0 - x1).norm_squared() * T::HALF;
+    let u02 = (x0 - x2).norm_squared() * T::HALF;
+    let u12 = (x1 - x2).norm_squared() * T::HALF;
+    let (m01, m02, m12) = (T::ONE - u01, T::ONE - u02, T::ONE - u12);
+    let (s01, s02, s12) = ((T::TWO - u01) * u01, (T::TWO - u02) * u02, (T::TWO - u12) * u12);
+    // 2 (m01 m02 m12 - 1)
+    let w = T::TWO * ((u01 * u02 - u01 - u02) * m12 - u12);
+
+    // det(D01 + s D02) = k3 s^3 + k2 s^2 + k1 s + k0, D0i the conic of a12 |d0 x0 - di xi|^2 = a0i |d1 x1 - d2 x2|^2
+    let inverse = T::ONE / a12;
+    let (a, b) = (a01 * inverse, a02 * inverse);
+    let (as12, bs12) = (a * s12, b * s12);
+    let k3 = b * (bs12 - s02);
+    let k2 = (T::ONE - a) * s02 + b * (T::TWO * as12 + bs12 + w);
+    let k1 = (T::ONE - b) * s01 + a * (T::TWO * bs12 + as12 + w);
+    let k0 = a * (as12 - s01);
+    // A leading coefficient of zero (an isosceles triangle seen as one) is a root at infinity: a large one serves.
+    let least = T::EPSILON * lit::<T>(8.0) * (abs(k2) + abs(k1) + abs(k0));
+    let k3 = if abs(k3) > least { k3 } else { least };
+    let inverse = T::ONE / k3;
+    let s = real_root_of_cubic(k2 * inverse, k1 * inverse, k0 * inverse);
+    // D01 + s D02, the pair of lines
+    let c00 = T::ONE + s;
+    let (c01, c02) = (-m01, -s * m02);
+    let ab = a + s * b;
+    let (c11, c22) = (T::ONE - ab, s - ab);
+    let (am12, bm12) = (a * m12, b * m12);
+    let c12 = am12 + s * bm12;
+    let conic = Matrix3::new(c00, c01, c02, c01, c11, c12, c02, c12, c22);
+
+    // R maps (f1, f2, f1 x f2) to the same of the camera's points: R = [e1 e2 e1 x e2] [g1 g2 g3]'
+    let normal = f1.cross(&f2);
+    let area = normal.norm_squared();
+    let inverse = T::ONE / area;
+    let g3 = normal * inverse;
+    let (g1, g2) = (f2.cross(&g3), g3.cross(&f1));
+    let largest = max(max(a01, a02), a12);
+    if !(area > largest * largest * (T::EPSILON * T::EPSILON * lit::<T>(256.0))) {
+        return solutions;
+    }
+
+    // The points of the two lines on the conic s D01 - D02, the farthest from the pair. Nothing here branches: what is
+    // not real becomes NaN and fails the last comparison.
+    let mut candidates = [[T::ZERO; 3]; 4];
+    let mut count = 0;
+    for line in lines_of_conic(&conic) {
+        // l0 d0 = -(l1 d1 + l2 d2), then q2 d1^2 + 2 q1 d1 d2 + q0 d2^2 = 0
+        let (l0, l1, l2) = (line.x, line.y, line.z);
+        let (l00, l11, l22, l12) = (l0 * l0, l1 * l1, l2 * l2, l1 * l2);
+        let (m1, m2) = (m01 * l0, m02 * l0);
+        let q2 = s * (l11 + T::TWO * m1 * l1 + (T::ONE - a) * l00) - (l11 - b * l00);
+        let q1 = s * (l12 + m1 * l2 + am12 * l00) - (l12 + m2 * l1 + bm12 * l00);
+        let q0 = s * (l22 - a * l00) - (l22 + T::TWO * m2 * l2 + (T::ONE - b) * l00);
+        let (square, product) = (q1 * q1, q2 * q0);
+        let discriminant = square - product;
+        // A double root may fall on either side of zero by rounding.
+        let rounding = (square + abs(product)) * T::EPSILON * lit::<T>(64.0);
+        let root = sqrt(max(discriminant, min(discriminant + rounding, T::ZERO)));
+        let q = if q1 > T::ZERO { -(q1 + root) } else { root - q1 };
+        let inverse = -T::ONE / l0;
+        let (w1, w2) = (l1 * inverse, l2 * inverse);
+        // d1 : d2
+        for (n1, n2) in [(q, q2), (q0, q)] {
+            let scale = sqrt(a12 / (n1 * n1 + n2 * n2 - T::TWO * m12 * (n1 * n2)));
+            let (d1, d2) = (abs(n1) * scale, abs(n2) * scale);
+            let d0 = w1 * d1 + w2 * d2;
+            if let Some(candidate) = candidates.get_mut(count) {
+                *candidate = [d0, d1, d2];
+            }
+            count += usize::from((d0 > T::ZERO) & (n1 * n2 > T::ZERO));
+        }
+    }
+
+    for d in candidates.iter_mut().take(count) {
+        if !refine(d, [u01, u02, u12], [a01, a02, a12], largest) {
+            continue;
+        }
+        let y0 = x0 * d[0];
+        let (e1, e2) = (x1 * d[1] - y0, x2 * d[2] - y0);
+        let e3 = e1.cross(&e2);
+        let rotation = e1 * g1.transpose() + e2 * g2.transpose() + e3 * g3.transpose();
+        let translation = y0 - rotation * p0;
+        solutions.push(pose::from_parts(&rotation, &translation));
+    }
+    solutions
+}
+
+/// Newton on the distances. False where they are no solution.
+#[inline]
+fn refine<T: Real>(d: &mut [T; 3], u: [T; 3], a: [T; 3], largest: T) -> bool {
+    let [u01, u02, u12] = u;
+    let [a01, a02, a12] = a;
+    // A residual whose square is lost in rounding: the step that follows it is the last.
+    let quadratic = largest * sqrt(T::EPSILON) * lit::<T>(0.25);
+    for _ in 0..MAX_REFINEMENTS {
+        let [d0, d1, d2] = *d;
+        // |d0 x0 - d1 x1|^2 = (d0 - d1)^2 + 2 u01 d0 d1: no cancellation before the difference from a01
+        let (e01, e02, e12) = (d0 - d1, d0 - d2, d1 - d2);
+        let (v01, v10) = (u01 * d0, u01 * d1);
+        let (v02, v20) = (u02 * d0, u02 * d2);
+        let (v12, v21) = (u12 * d1, u12 * d2);
+        let r01 = (e01 * e01 - a01) * T::HALF + v01 * d1;
+        let r02 = (e02 * e02 - a02) * T::HALF + v02 * d2;
+        let r12 = (e12 * e12 - a12) * T::HALF + v12 * d2;
+        let size = abs(r01) + abs(r02) + abs(r12);
+        // J = [p q 0; r 0 s; 0 u v] by its adjugate
+        let (p, q) = (e01 + v10, v01 - e01);
+        let (r, s) = (e02 + v20, v02 - e02);
+        let (u, v) = (e12 + v21, v12 - e12);
+        let (su, rv) = (s * u, r * v);
+        let inverse = T::ONE / (p * su + q * rv);
+        let w = v * r02 - s * r12;
+        d[0] = d0 - (su * r01 + q * w) * inverse;
+        d[1] = d1 - (rv * r01 - p * w) * inverse;
+        d[2] = d2 - (u * (p * r02 - r * r01) + q * r * r12) * inverse;
+        if size < quadratic {
+            return min(min(d[0], d[1]), d[2]) > T::ZERO;
+        }
+    }
+    false
+}
