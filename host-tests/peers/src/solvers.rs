@@ -2,6 +2,7 @@
 
 use std::slice;
 
+use epipole::geometry::triangulation::{Triangulation, ViewPair};
 use epipole::geometry::{Essential, Pose};
 use epipole::nalgebra::{Matrix3, Vector3};
 use epipole::{Real, solvers};
@@ -75,6 +76,8 @@ export! {
     bench_5pt_f32 bench_5pt_f64: relpose_5pt;
     bench_5ptpose_f32 bench_5ptpose_f64: relpose_5pt_poses;
     bench_edecomp_f32 bench_edecomp_f64: pose_by_cheirality;
+    bench_trimid_f32 bench_trimid_f64: triangulate_midpoint;
+    bench_tridlt_f32 bench_tridlt_f64: triangulate_dlt;
 }
 
 unsafe fn relpose_5pt<T: Real>(a: *const T, b: *const T, out: *mut T) -> i32 {
@@ -96,4 +99,38 @@ unsafe fn pose_by_cheirality<T: Real>(a: *const T, b: *const T, out: *mut T) -> 
     let pose = e.pose_by_cheirality(&x1, &x2).filter(|p| p.in_front == 5).map(|p| p.pose);
     // SAFETY: at most one pose.
     unsafe { put_poses(out, pose) }
+}
+
+/// A bearing of each view, and R row-major with t, to the point in the frame of view 1.
+///
+/// # Safety
+/// As of the exported functions.
+unsafe fn triangulate<T: Real>(
+    a: *const T,
+    b: *const T,
+    out: *mut T,
+    method: impl FnOnce(&ViewPair<T>, &Vector3<T>, &Vector3<T>) -> Triangulation<T>,
+) -> i32 {
+    // SAFETY: as the caller promises.
+    let ([x1, x2], pose) = unsafe { (bearings(a), slice::from_raw_parts(b, 12)) };
+    let t = Vector3::new(pose[9], pose[10], pose[11]);
+    let views = ViewPair::from_parts(&Matrix3::from_row_slice(&pose[..9]), &t);
+    let (Triangulation::Point(point) | Triangulation::Behind { point, .. }) = method(&views, &x1, &x2) else {
+        return 0;
+    };
+    for (k, v) in point.iter().enumerate() {
+        // SAFETY: room for one point.
+        unsafe { *out.add(k) = *v };
+    }
+    1
+}
+
+unsafe fn triangulate_midpoint<T: Real>(a: *const T, b: *const T, out: *mut T) -> i32 {
+    // SAFETY: two bearings, a pose, a point.
+    unsafe { triangulate(a, b, out, ViewPair::triangulate_midpoint) }
+}
+
+unsafe fn triangulate_dlt<T: Real>(a: *const T, b: *const T, out: *mut T) -> i32 {
+    // SAFETY: two bearings, a pose, a point.
+    unsafe { triangulate(a, b, out, ViewPair::triangulate_dlt) }
 }

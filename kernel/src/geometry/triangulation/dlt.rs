@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Triangulation, ViewPair, all_finite, parallel_sine};
+use super::{Triangulation, ViewPair, all_finite, judge, judge_parallel, parallel_sine};
 use crate::geometry::Pose;
 use crate::geometry::pose::{centre, tangent_basis};
 use crate::linalg::RowQr;
@@ -49,7 +49,7 @@ impl<T: Real> ViewPair<T> {
         let (cross_sq, n1, n2) = (p.norm_squared(), x1.norm_squared(), d2.norm_squared());
         let limit = parallel_sine::<T>() * parallel_sine::<T>() * n1 * n2;
         if !(cross_sq > limit && cross_sq >= T::MIN_POSITIVE && cross_sq <= T::MAX) {
-            return self.judge_parallel(x1, &d2);
+            return judge_parallel(self.centre, *x1, d2);
         }
         let baseline_sq = self.centre.norm_squared();
         if !(baseline_sq >= T::MIN_POSITIVE && baseline_sq <= T::MAX) {
@@ -73,7 +73,7 @@ impl<T: Real> ViewPair<T> {
         let out = e / (T::TWO - least.mu);
         let across = -k * g * least.mu / least.d;
         let local = u1 * along + normal * out + normal.cross(&u1) * across;
-        self.judge(local * baseline, along, (local - c).dot(&u2))
+        judge(&self.centre, local * baseline, along, (local - c).dot(&u2))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Triangulation, ViewPair, parallel_sine};
+use super::{Triangulation, ViewPair, judge, judge_parallel, parallel_sine};
 use crate::Real;
 
 impl<T: Real> ViewPair<T> {
@@ -47,11 +47,11 @@ impl<T: Real> ViewPair<T> {
         let limit = parallel_sine::<T>() * parallel_sine::<T>() * x1.norm_squared() * d2.norm_squared();
         // Also false for NaN, and where the squares overflow or underflow.
         if !(sine_sq > limit && sine_sq >= T::MIN_POSITIVE && sine_sq <= T::MAX) {
-            return self.judge_parallel(x1, &d2);
+            return judge_parallel(self.centre, *x1, d2);
         }
         let depth1 = p.dot(&c.cross(&d2));
         let depth2 = p.dot(&c.cross(x1));
         let point = (x1 * depth1 + d2 * depth2) * (T::HALF / sine_sq) + c * T::HALF;
-        self.judge(point, depth1, depth2)
+        judge(c, point, depth1, depth2)
     }
 }

@@ -15,7 +15,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::Pose;
-use super::pose::{skew, vector_angle};
+use super::pose::vector_angle;
 use crate::Real;
 use crate::real::{abs, is_finite, lit, max, sqrt};
 
@@ -92,7 +92,6 @@ pub struct ViewPair<T: Real> {
     rotation: Matrix3<T>,
     /// Of view 2, in the frame of view 1.
     centre: Vector3<T>,
-    essential: Matrix3<T>,
 }
 
 impl<T: Real> ViewPair<T> {
@@ -107,7 +106,7 @@ impl<T: Real> ViewPair<T> {
     #[inline]
     #[must_use]
     pub fn from_parts(r: &Matrix3<T>, t: &Vector3<T>) -> Self {
-        Self { rotation: *r, centre: -r.tr_mul(t), essential: skew(t) * r }
+        Self { rotation: *r, centre: -r.tr_mul(t) }
     }
 
     /// The centre of view 2 in the frame of view 1, `-R' t`.
@@ -123,47 +122,46 @@ impl<T: Real> ViewPair<T> {
     pub fn parallax(&self, point: &Vector3<T>) -> T {
         vector_angle(point, &(point - self.centre))
     }
+}
 
-    /// The verdict on a point with the signs of its depths along the two bearings.
-    #[inline]
-    fn judge(&self, point: Vector3<T>, depth1: T, depth2: T) -> Triangulation<T> {
-        // The sum is finite only where every term is; a smaller depth has lost digits to underflow.
-        let size = abs(point.x) + abs(point.y) + abs(point.z);
-        let least = T::MIN_POSITIVE / T::EPSILON;
-        if depth1 >= least && depth2 >= least && size <= T::MAX {
-            Triangulation::Point(point)
-        } else {
-            self.judge_behind(point, depth1, depth2)
-        }
+/// The verdict on a point with the signs of its depths along the two bearings; `centre` of view 2 in the frame of view 1.
+#[inline]
+fn judge<T: Real>(centre: &Vector3<T>, point: Vector3<T>, depth1: T, depth2: T) -> Triangulation<T> {
+    // The sum is finite only where every term is; a smaller depth has lost digits to underflow.
+    let size = abs(point.x) + abs(point.y) + abs(point.z);
+    let least = T::MIN_POSITIVE / T::EPSILON;
+    if depth1 >= least && depth2 >= least && size <= T::MAX {
+        Triangulation::Point(point)
+    } else {
+        judge_behind(*centre, point, depth1, depth2)
     }
+}
 
-    #[cold]
-    fn judge_behind(&self, point: Vector3<T>, depth1: T, depth2: T) -> Triangulation<T> {
-        let front = [depth1 > T::ZERO, depth2 > T::ZERO];
-        let finite = is_finite(depth1) && is_finite(depth2) && all_finite(&point);
-        if !finite || self.centre == Vector3::zeros() || front == [true, true] {
-            return Triangulation::Undetermined;
-        }
-        let count = front.iter().filter(|f| !**f).count();
-        Triangulation::Behind { point, view: if front[0] { 1 } else { 0 }, count }
+// The arguments by value: a reference would force the hot path to keep them in memory.
+#[cold]
+fn judge_behind<T: Real>(centre: Vector3<T>, point: Vector3<T>, depth1: T, depth2: T) -> Triangulation<T> {
+    let front = [depth1 > T::ZERO, depth2 > T::ZERO];
+    let finite = is_finite(depth1) && is_finite(depth2) && all_finite(&point);
+    if !finite || centre == Vector3::zeros() || front == [true, true] {
+        return Triangulation::Undetermined;
     }
+    let count = front.iter().filter(|f| !**f).count();
+    Triangulation::Behind { point, view: if front[0] { 1 } else { 0 }, count }
+}
 
-    /// The verdict where the rays `x1` and `d2`, both in the frame of view 1, have no parallax.
-    #[cold]
-    fn judge_parallel(&self, x1: &Vector3<T>, d2: &Vector3<T>) -> Triangulation<T> {
-        let Some((x1, d2, c)) =
-            scaled(x1).zip(scaled(d2)).zip(scaled(&self.centre)).map(|((a, b), c)| (a, b, c))
-        else {
-            return Triangulation::Undetermined;
-        };
-        let limit = parallel_sine::<T>() * parallel_sine::<T>();
-        let length_sq = x1.norm_squared();
-        let parallel = |v: &Vector3<T>| x1.cross(v).norm_squared() <= limit * length_sq * v.norm_squared();
-        if !parallel(&d2) || parallel(&c) || x1.dot(&d2) <= T::ZERO {
-            return Triangulation::Undetermined;
-        }
-        Triangulation::AtInfinity { direction: x1 / sqrt(length_sq) }
+/// The verdict where the rays `x1` and `d2`, both in the frame of view 1, have no parallax.
+#[cold]
+fn judge_parallel<T: Real>(centre: Vector3<T>, x1: Vector3<T>, d2: Vector3<T>) -> Triangulation<T> {
+    let (Some(x1), Some(d2), Some(c)) = (scaled(&x1), scaled(&d2), scaled(&centre)) else {
+        return Triangulation::Undetermined;
+    };
+    let limit = parallel_sine::<T>() * parallel_sine::<T>();
+    let length_sq = x1.norm_squared();
+    let parallel = |v: &Vector3<T>| x1.cross(v).norm_squared() <= limit * length_sq * v.norm_squared();
+    if !parallel(&d2) || parallel(&c) || x1.dot(&d2) <= T::ZERO {
+        return Triangulation::Undetermined;
     }
+    Triangulation::AtInfinity { direction: x1 / sqrt(length_sq) }
 }
 
 fn all_finite<T: Real>(v: &Vector3<T>) -> bool {

@@ -4,6 +4,7 @@ use nalgebra::{Matrix3x2, Vector3};
 
 use super::{Triangulation, ViewPair};
 use crate::Real;
+use crate::geometry::pose::skew;
 use crate::real::{abs, max, sqrt};
 
 impl<T: Real> ViewPair<T> {
@@ -58,7 +59,8 @@ impl<T: Real> ViewPair<T> {
     ) -> Triangulation<T> {
         let c = &self.centre;
         // The scale of E does not matter; fourth powers of its entries must stay in range.
-        let e = self.essential * (T::ONE / max(abs(c.x), max(abs(c.y), abs(c.z))));
+        let c = c * (T::ONE / max(abs(c.x), max(abs(c.y), abs(c.z))));
+        let e = -(self.rotation * skew(&c)); // [t]x R with t = -R c
         let line2 = e * x1;
         let e_j1 = e * j1;
         let m = j2.tr_mul(&e_j1);
