@@ -5,8 +5,8 @@ use nalgebra::SMatrix;
 use crate::Real;
 use crate::real::{abs, is_finite, max};
 
-mod cubic;
 pub(crate) mod conic;
+mod cubic;
 mod eigen;
 mod lanes;
 mod ldlt;
