@@ -151,6 +151,19 @@ in_both_scalars! {
         }
     }
 
+    /// The calibrated images of EuRoC MAV's and TUM-VI's cameras, to the corners.
+    fn every_pixel_of_a_calibrated_image_has_a_bearing<T>() {
+        for (lens, width, height) in [(LENSES[1], 752, 480), (LENSES[4], 512, 512)] {
+            let camera = lens.camera::<T>();
+            for (u, v) in (0..width).step_by(7).flat_map(|u| (0..height).step_by(7).map(move |v| (u, v))) {
+                let pixel = Vector2::new(lit::<T>(f64::from(u)), lit(f64::from(v)));
+                let bearing = camera.unproject(&pixel).unwrap_or_else(|e| panic!("{} {u} {v}: {e}", lens.name));
+                let distance = pixel_distance(&camera.project(&bearing).unwrap(), &pixel);
+                assert!(distance < tolerances::PROJECTION_PX.of::<T>(), "{} {u} {v}: {distance}", lens.name);
+            }
+        }
+    }
+
     /// The analytic Jacobians in `T` against central differences in `f64`.
     fn jacobians_are_the_differences<T>() {
         let bound = tolerances::JACOBIAN.of::<T>();
