@@ -1,4 +1,5 @@
-//! Writing a triangulated pair for other programs: PLY for mesh viewers, COLMAP's text model for reconstruction tools.
+//! Writing a triangulated pair for other programs: PLY for mesh viewers, COLMAP's text model for reconstruction tools,
+//! correspondences for `evaluate`.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -8,6 +9,7 @@ use std::path::Path;
 use epipole::nalgebra::{Isometry3, Vector3};
 
 use crate::lens::CameraParameters;
+use crate::matching::Match;
 
 /// A triangulated correspondence.
 #[derive(Clone, Copy, Debug)]
@@ -89,4 +91,32 @@ pub fn write_colmap(directory: &Path, views: &[View<'_>; 2], points: &[ScenePoin
     fs::write(directory.join("cameras.txt"), cameras)?;
     fs::write(directory.join("images.txt"), images)?;
     fs::write(directory.join("points3D.txt"), list)
+}
+
+/// Correspondences with the true pose, best first, in the text format of `evaluate`; lens distortion is not part of it.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_matches(
+    path: &Path,
+    cameras: &[CameraParameters; 2],
+    size: [u32; 2],
+    truth: &Isometry3<f64>,
+    matches: &[Match],
+) -> io::Result<()> {
+    let mut sorted: Vec<&Match> = matches.iter().collect();
+    sorted.sort_by_key(|m| m.distance);
+    let join = |numbers: &[f64]| numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
+    let mut out = format!("# size {} {}\n", size[0], size[1]);
+    for (name, camera) in ["K1", "K2"].iter().zip(cameras) {
+        let _ = writeln!(out, "{name} {}", join(&camera.intrinsics));
+    }
+    let rotation = truth.rotation.to_rotation_matrix().into_inner();
+    let _ = writeln!(out, "R_gt {}", join(rotation.transpose().as_slice()));
+    let _ = writeln!(out, "t_gt {}", join(truth.translation.vector.as_slice()));
+    let _ = writeln!(out, "n {}", sorted.len());
+    for m in sorted {
+        let _ = writeln!(out, "{:.4} {:.4} {:.4} {:.4} {}", m.x1[0], m.x1[1], m.x2[0], m.x2[1], m.distance);
+    }
+    fs::write(path, out)
 }

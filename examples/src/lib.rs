@@ -12,3 +12,5 @@ pub mod picture;
 pub mod pyramid;
 pub mod render;
 pub mod texture;
+pub mod track;
+pub mod two_view;

@@ -105,7 +105,7 @@ fn shrink(image: &RgbImage, scale: f32) -> RgbImage {
     };
     for Rgb(p) in out.pixels_mut() {
         let grey = p.iter().map(|&c| u32::from(c)).sum::<u32>() as f32 / 3.0;
-        *p = p.map(|c| (0.72 * (0.7 * f32::from(c) + 0.3 * grey)) as u8);
+        *p = p.map(|c| (0.85 * (0.75 * f32::from(c) + 0.25 * grey)) as u8);
     }
     out
 }
@@ -131,21 +131,22 @@ fn spread<'a>(matches: &[&'a Match], n: usize) -> Vec<&'a Match> {
     taken
 }
 
-/// Where the ray of `pixel` of one camera appears in the other: points of a line, or of a curve under distortion.
+/// Where the epipolar plane of `pixel` of one camera appears in the other: points of a line, or of a curve under
+/// distortion.
 fn epipolar_line(
     from: &Camera<f64>,
     to: &Camera<f64>,
     pose: &Isometry3<f64>,
     pixel: [f64; 2],
 ) -> Vec<Option<[f64; 2]>> {
-    const STEPS: i32 = 600;
+    const STEPS: i32 = 4000;
     let Ok(bearing) = from.unproject(&Vector2::from(pixel)) else {
         return Vec::new();
     };
-    // From the epipole (depth 0) to infinity, in equal steps of the angle at the other camera, for |t| = 1.
-    (1..STEPS)
+    // The whole plane of the ray and the baseline, in equal steps around the other camera, for |t| = 1.
+    (0..=STEPS)
         .map(|i| {
-            let angle = f64::from(i) / f64::from(STEPS) * std::f64::consts::FRAC_PI_2;
+            let angle = f64::from(i) / f64::from(STEPS) * std::f64::consts::TAU;
             let point = pose.rotation * (bearing * angle.sin()) + pose.translation.vector * angle.cos();
             to.project(&point).map(|p| [p.x, p.y])
         })

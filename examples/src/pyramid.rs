@@ -4,7 +4,6 @@
 
 use image::GrayImage;
 use image::imageops::{FilterType, resize};
-use imageproc::filter::gaussian_blur_f32;
 
 /// One level: the image, a smoothed copy for binary tests, and the size of its pixel in full-resolution pixels.
 pub struct Level {
@@ -28,21 +27,57 @@ impl Level {
 /// `levels` images, each `factor` times coarser than the one before; it stops where a side falls below `min_side`.
 pub fn pyramid(image: &GrayImage, levels: usize, factor: f32, min_side: u32) -> Vec<Level> {
     let (width, height) = image.dimensions();
-    let mut out = Vec::with_capacity(levels);
-    for i in 0..levels {
+    let size = |i: usize| {
         let scale = factor.powi(i as i32);
-        let (w, h) = ((width as f32 / scale).round() as u32, (height as f32 / scale).round() as u32);
-        if w < min_side || h < min_side {
-            break;
+        ((width as f32 / scale).round() as u32, (height as f32 / scale).round() as u32)
+    };
+    let sizes: Vec<(u32, u32)> =
+        (0..levels).map(size).take_while(|(w, h)| *w >= min_side && *h >= min_side).collect();
+    let level = |(w, h): (u32, u32)| {
+        let same = (w, h) == (width, height);
+        let level = if same { image.clone() } else { resize(image, w, h, FilterType::Triangle) };
+        let pixel_size = [width as f32 / w as f32, height as f32 / h as f32];
+        Level { smooth: blur(&level), image: level, pixel_size }
+    };
+    std::thread::scope(|scope| {
+        let level = &level;
+        let work: Vec<_> = sizes.into_iter().map(|size| scope.spawn(move || level(size))).collect();
+        work.into_iter().map(|w| w.join().expect("pyramid thread")).collect()
+    })
+}
+
+/// A Gaussian blur of 2 pixels, row by row and then column by column, the border repeated.
+fn blur(image: &GrayImage) -> GrayImage {
+    const RADIUS: usize = 6;
+    const SIGMA: f32 = 2.0;
+    let mut kernel: [f32; 2 * RADIUS + 1] =
+        std::array::from_fn(|i| (-(i as f32 - RADIUS as f32).powi(2) / (2.0 * SIGMA * SIGMA)).exp());
+    let total: f32 = kernel.iter().sum();
+    kernel.iter_mut().for_each(|k| *k /= total);
+
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    let mut padded = vec![0.0f32; width + 2 * RADIUS];
+    let mut rows = vec![0.0f32; width * height];
+    for (out, row) in rows.chunks_mut(width).zip(image.as_raw().chunks(width)) {
+        for (i, p) in padded.iter_mut().enumerate() {
+            *p = f32::from(row[i.saturating_sub(RADIUS).min(width - 1)]);
         }
-        let level = if i == 0 { image.clone() } else { resize(image, w, h, FilterType::Triangle) };
-        out.push(Level {
-            smooth: gaussian_blur_f32(&level, 2.0),
-            image: level,
-            pixel_size: [width as f32 / w as f32, height as f32 / h as f32],
-        });
+        for (k, weight) in kernel.iter().enumerate() {
+            out.iter_mut().zip(&padded[k..]).for_each(|(o, p)| *o += weight * p);
+        }
     }
-    out
+    let mut smooth = GrayImage::new(image.width(), image.height());
+    let mut sum = vec![0.0f32; width];
+    for (y, out) in smooth.chunks_mut(width).enumerate() {
+        // Half a grey value, so that the conversion rounds to the nearest.
+        sum.fill(0.5);
+        for (k, weight) in kernel.iter().enumerate() {
+            let row = (y + k).saturating_sub(RADIUS).min(height - 1);
+            sum.iter_mut().zip(&rows[row * width..]).for_each(|(s, r)| *s += weight * r);
+        }
+        out.iter_mut().zip(&sum).for_each(|(o, s)| *o = *s as u8);
+    }
+    smooth
 }
 
 /// Bilinear interpolation, clamped to the border.

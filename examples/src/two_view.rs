@@ -1,0 +1,114 @@
+//! From matched pixels of two images to a pose, inliers and points, in either scalar.
+
+use epipole::Real;
+use epipole::estimate::{self, RelativePoseOptions, TwoViewWorkspace};
+use epipole::geometry::triangulation::{Triangulation, ViewPair};
+use epipole::geometry::{Camera, CameraModel, Pose};
+use epipole::nalgebra::{Isometry3, Matrix3, Quaternion, UnitQuaternion, Vector2, Vector3};
+use epipole::real::lit;
+
+use crate::lens::CameraParameters;
+use crate::matching::Match;
+
+/// What a user may choose of the estimation.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    pub threshold_px: f64,
+    pub seed: u64,
+}
+
+/// The pose between two views and what supports it.
+#[derive(Clone, Debug)]
+pub struct TwoView {
+    /// `X2 = R X1 + t`, |t| = 1.
+    pub pose: Isometry3<f64>,
+    /// One entry a match.
+    pub inliers: Vec<bool>,
+    pub iterations: u32,
+    /// Triangulated inliers in front of both cameras: index of the match, and the point in the frame of view 1.
+    pub points: Vec<(usize, Vector3<f64>)>,
+}
+
+impl TwoView {
+    pub fn inlier_count(&self) -> usize {
+        self.inliers.iter().filter(|i| **i).count()
+    }
+}
+
+/// Estimates the pose between two views.
+///
+/// # Errors
+/// One sentence that says why there is none.
+pub fn estimate<T: Real>(
+    cameras: &[CameraParameters; 2],
+    matches: &[Match],
+    settings: &Settings,
+) -> Result<TwoView, String> {
+    let camera = |i: usize| cameras[i].camera::<T>().map_err(|e| e.to_string());
+    let (camera1, camera2) = (camera(0)?, camera(1)?);
+    let pixel = |p: [f64; 2]| Vector2::new(lit::<T>(p[0]), lit::<T>(p[1]));
+    let x1: Vec<Vector2<T>> = matches.iter().map(|m| pixel(m.x1)).collect();
+    let x2: Vec<Vector2<T>> = matches.iter().map(|m| pixel(m.x2)).collect();
+
+    let mut options = RelativePoseOptions::<T>::default();
+    options.max_error_px = lit(settings.threshold_px);
+    options.ransac.seed = settings.seed;
+    // Room for cameras of any kind: 18 numbers a correspondence, in groups of four.
+    let capacity = matches.len().next_multiple_of(4);
+    let (mut numbers, mut order) = (vec![T::ZERO; 18 * capacity], vec![0; capacity]);
+    let mut inliers = vec![false; capacity];
+    let mut workspace = TwoViewWorkspace::from_slices(&mut numbers, &mut order, &mut inliers);
+    let estimate = estimate::relative_pose(&camera1, &camera2, &x1, &x2, &options, &mut workspace)
+        .map_err(|e| e.to_string())?;
+    let pose = estimate
+        .pose()
+        .ok_or_else(|| format!("the {} matches agree on no pose: {:?}", matches.len(), estimate.verdict))?;
+    let inliers = workspace.inliers().to_vec();
+    Ok(TwoView {
+        pose: widen(&pose),
+        iterations: estimate.report.spent.iterations,
+        points: triangulate([&camera1, &camera2], &pose, &x1, &x2, &inliers),
+        inliers,
+    })
+}
+
+/// The pose in double precision.
+fn widen<T: Real>(pose: &Pose<T>) -> Isometry3<f64> {
+    let (q, t) = (pose.rotation.coords, pose.translation.vector);
+    let quaternion = Quaternion::from(q.map(|x| x.to_f64()));
+    Isometry3::from_parts(t.map(|x| x.to_f64()).into(), UnitQuaternion::from_quaternion(quaternion))
+}
+
+/// The inliers' points with least reprojection error, where they lie in front of both cameras.
+fn triangulate<T: Real>(
+    cameras: [&Camera<T>; 2],
+    pose: &Pose<T>,
+    x1: &[Vector2<T>],
+    x2: &[Vector2<T>],
+    inliers: &[bool],
+) -> Vec<(usize, Vector3<f64>)> {
+    let pair = ViewPair::new(pose);
+    let [camera1, camera2] = cameras;
+    let point = |p: &Vector2<T>, q: &Vector2<T>| {
+        let (f, j) = camera1.unproject_with_jacobian(p).ok()?;
+        let (g, k) = camera2.unproject_with_jacobian(q).ok()?;
+        match pair.triangulate_optimal_bearings(&f, &g, &j, &k) {
+            Triangulation::Point(point) => Some(point.map(|x| x.to_f64())),
+            _ => None,
+        }
+    };
+    let pairs = x1.iter().zip(x2).zip(inliers).enumerate().filter(|(_, (_, inlier))| **inlier);
+    pairs.filter_map(|(index, ((p, q), _))| point(p, q).map(|x| (index, x))).collect()
+}
+
+/// The angle between two rotations in degrees, by the chord: `|A - B|_F = 2 sqrt 2 sin(angle / 2)`.
+#[must_use]
+pub fn rotation_error_deg(a: &Matrix3<f64>, b: &Matrix3<f64>) -> f64 {
+    (2.0 * ((a - b).norm() / 8f64.sqrt()).min(1.0).asin()).to_degrees()
+}
+
+/// The angle between two directions in degrees, by the chord.
+#[must_use]
+pub fn direction_error_deg(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
+    (2.0 * ((a.normalize() - b.normalize()).norm() / 2.0).min(1.0).asin()).to_degrees()
+}
