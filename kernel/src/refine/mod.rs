@@ -3,5 +3,3 @@
 pub(crate) mod blocks;
 pub(crate) mod lm;
 pub(crate) mod relative_pose;
-
-pub use relative_pose::tangent_basis;

@@ -5,8 +5,8 @@ use nalgebra::{Matrix3, SVector, Vector3};
 use super::lm::Manifold;
 use crate::Real;
 use crate::geometry::Pose;
-use crate::geometry::pose::from_parts;
-use crate::real::{abs, sqrt};
+use crate::geometry::pose::{from_parts, tangent_basis};
+use crate::real::sqrt;
 
 /// A rotation, a unit translation, and the scales between normalised coordinates and the blocks' coordinates.
 #[derive(Clone, Copy, Debug)]
@@ -62,24 +62,6 @@ impl<T: Real> Scales<T> {
     }
 }
 
-/// Two unit vectors orthogonal to the unit vector `t` and to each other: the documented basis of the tangent plane of
-/// the sphere of translations. The first is the cross product of `t` with the axis on which `t` is smallest.
-#[must_use]
-pub fn tangent_basis<T: Real>(t: &Vector3<T>) -> (Vector3<T>, Vector3<T>) {
-    let (a, b, c) = (abs(t.x), abs(t.y), abs(t.z));
-    let (zero, one) = (T::ZERO, T::ONE);
-    let axis = if a <= b && a <= c {
-        Vector3::new(one, zero, zero)
-    } else if b <= c {
-        Vector3::new(zero, one, zero)
-    } else {
-        Vector3::new(zero, zero, one)
-    };
-    let u = t.cross(&axis);
-    let u = u * (one / sqrt(u.norm_squared()));
-    (u, t.cross(&u))
-}
-
 /// A rotation near `Exp(w)`: exact as a rotation, equal to the exponential to second order (Cayley's map of w / 2).
 #[inline]
 pub(crate) fn cayley<T: Real>(w: &Vector3<T>) -> Matrix3<T> {
@@ -131,7 +113,8 @@ impl<T: Real> Manifold<T, 5> for PoseModel<T> {
     }
 
     fn tangents(&self) -> [[T; 9]; 5] {
-        let (u, v) = tangent_basis(&self.translation);
+        let basis = tangent_basis(&self.translation);
+        let (u, v): (Vector3<T>, Vector3<T>) = (basis.column(0).into(), basis.column(1).into());
         let t = &self.translation.data.0[0];
         let (s1, s2) = (self.scales.inverse1(), self.scales.inverse2());
         let (s1, s2) = ([s1[0], s1[1], T::ONE], [s2[0], s2[1], T::ONE]);
@@ -157,7 +140,8 @@ impl<T: Real> Manifold<T, 5> for PoseModel<T> {
     #[inline]
     fn retract(&self, step: &SVector<T, 5>) -> Self {
         let s = &step.data.0[0];
-        let (u, v) = tangent_basis(&self.translation);
+        let basis = tangent_basis(&self.translation);
+        let (u, v): (Vector3<T>, Vector3<T>) = (basis.column(0).into(), basis.column(1).into());
         let t = self.translation + u * s[3] + v * s[4];
         Self {
             rotation: cayley(&Vector3::new(s[0], s[1], s[2])) * self.rotation,

@@ -33,7 +33,7 @@ pub struct GeneralMotion<T: Real> {
     /// The pose of view 2 in the frame of view 1.
     pub pose: Pose<T>,
     /// Covariance of the rotation vector w of `R <- Exp(w) R` (rad), then of t in the basis of its tangent plane that
-    /// [`tangent_basis`](crate::refine::tangent_basis) gives; none where the inliers leave a direction open.
+    /// [`tangent_basis`](crate::geometry::pose::tangent_basis) gives; none where the inliers leave a direction open.
     pub covariance: Option<SMatrix<T, 5, 5>>,
 }
 
@@ -47,7 +47,7 @@ pub struct PlanarPose<T: Real> {
     /// |t| / d: the length of the true translation over the distance of the plane from view 1.
     pub baseline_over_distance: T,
     /// Covariance of w of `R <- Exp(w) R` (rad), of t / d, and of n in the basis of its tangent plane that
-    /// [`tangent_basis`](crate::refine::tangent_basis) gives; none where the inliers leave a direction open.
+    /// [`tangent_basis`](crate::geometry::pose::tangent_basis) gives; none where the inliers leave a direction open.
     pub covariance: Option<SMatrix<T, 8, 8>>,
 }
 
