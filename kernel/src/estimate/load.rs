@@ -62,7 +62,7 @@ pub(super) fn load_planes<T: Real>(
 ) -> Units<T> {
     let pixels = common_focal(camera1, camera2);
     let scale = |(fx, fy): (T, T)| [fx / pixels, fy / pixels];
-    let scales = Scales { view1: scale(focals[0]), view2: scale(focals[1]) };
+    let scales = Scales { view1: scale(focals[0]), view2: scale(focals[1]), ..Scales::unit() };
     let points = x1.iter().zip(x2).map(|(p, q)| {
         let a = plane_point(camera1, p, scales.view1);
         let b = plane_point(camera2, q, scales.view2);

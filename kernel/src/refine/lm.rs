@@ -14,6 +14,11 @@ pub(crate) trait Manifold<T: Real, const P: usize>: Copy {
     fn matrix(&self) -> Matrix3<T>;
     /// Its derivative by each local parameter, row by row.
     fn tangents(&self) -> [[T; 9]; P];
+    /// Which correspondences of a block the model may explain at all (those in front of the cameras).
+    #[inline(always)]
+    fn admits<B: EpipolarBlock<T>>(&self, _block: &B) -> [bool; LANES] {
+        [true; LANES]
+    }
     /// The model moved by a step in the local parameters.
     fn retract(&self, step: &SVector<T, P>) -> Self;
 }
@@ -113,8 +118,17 @@ where
     let mut left = data.count;
     for block in data.blocks {
         let (c, d) = block.residual(&f);
+        let mut inside = [false; LANES];
         for l in 0..LANES {
-            if l < left && c[l] * c[l] < limit * d[l] {
+            inside[l] = l < left && c[l] * c[l] < limit * d[l];
+        }
+        left = left.saturating_sub(LANES);
+        if inside == [false; LANES] {
+            continue;
+        }
+        let admitted = model.admits(block);
+        for l in 0..LANES {
+            if inside[l] && admitted[l] {
                 pending.set_lane(filled, block, l);
                 filled += 1;
                 active += 1;
@@ -124,7 +138,6 @@ where
                 }
             }
         }
-        left = left.saturating_sub(LANES);
     }
     if filled > 0 {
         sums.add(&pending, &f, &tangents, loss, filled);
@@ -204,4 +217,48 @@ where
         }
     }
     best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::refine::blocks::PlaneBlock;
+    use crate::refine::relative_pose::{PoseModel, Scales};
+    use nalgebra::Vector3;
+
+    fn model() -> PoseModel<f64> {
+        PoseModel {
+            rotation: crate::refine::relative_pose::cayley(&Vector3::new(0.1, -0.2, 0.05)),
+            translation: Vector3::new(0.3, -0.5, 0.8).normalize(),
+            scales: Scales { view1: [0.9, 1.1], view2: [1.05, 0.95], parallel_sq: 10.0 },
+        }
+    }
+
+    fn blocks() -> [PlaneBlock<f64>; 3] {
+        let mut blocks = [[[0.0; 4]; 4]; 3];
+        for (i, x) in blocks.iter_mut().flatten().flatten().enumerate() {
+            *x = ((i * i) as f64 * 0.7).sin();
+        }
+        blocks
+    }
+
+    #[test]
+    fn sums_agree_with_central_differences() {
+        let (model, blocks) = (model(), blocks());
+        let data = BlockSlice { blocks: &blocks, count: 10 };
+        for loss in [Loss::Squared, Loss::Cauchy(0.3), Loss::Truncated(2.0)] {
+            let sums = normal_equations::<_, _, _, 5>(data, &model, &loss);
+            for p in 0..5 {
+                let h = 1e-6;
+                let moved = |h: f64| {
+                    let mut step = SVector::<f64, 5>::zeros();
+                    step[p] = h;
+                    normal_equations::<_, _, _, 5>(data, &model.retract(&step), &loss).cost
+                };
+                // The cost is the sum of the losses, its derivative twice J'Wr.
+                let slope = (moved(h) - moved(-h)) / (4.0 * h);
+                assert!((slope - sums.gradient[p]).abs() < 1e-7, "{p} {loss:?} {slope} {}", sums.gradient[p]);
+            }
+        }
+    }
 }

@@ -2,10 +2,12 @@
 
 use nalgebra::{Matrix3, SVector, Vector3};
 
+use super::blocks::{EpipolarBlock, in_front};
 use super::lm::Manifold;
 use crate::Real;
 use crate::geometry::Pose;
 use crate::geometry::pose::{from_parts, tangent_basis};
+use crate::linalg::LANES;
 use crate::real::sqrt;
 
 /// A rotation, a unit translation, and the scales between normalised coordinates and the blocks' coordinates.
@@ -27,13 +29,15 @@ pub(crate) struct Scales<T> {
     pub(crate) view1: [T; 2],
     /// View 2.
     pub(crate) view2: [T; 2],
+    /// Squared sine of the angle up to which rays count as parallel, so that their depths say nothing.
+    pub(crate) parallel_sq: T,
 }
 
 impl<T: Real> Scales<T> {
     /// No scaling.
     #[must_use]
     pub(crate) fn unit() -> Self {
-        Self { view1: [T::ONE; 2], view2: [T::ONE; 2] }
+        Self { view1: [T::ONE; 2], view2: [T::ONE; 2], parallel_sq: T::ZERO }
     }
 
     /// `D2^-1 E D1^-1` with `D = diag(scales, 1)`.
@@ -135,6 +139,19 @@ impl<T: Real> Manifold<T, 5> for PoseModel<T> {
             }
         }
         result
+    }
+
+    #[inline(always)]
+    fn admits<B: EpipolarBlock<T>>(&self, block: &B) -> [bool; LANES] {
+        let (mut f1, mut f2) = block.directions();
+        let (s1, s2) = (self.scales.inverse1(), self.scales.inverse2());
+        for l in 0..LANES {
+            f1[0][l] *= s1[0];
+            f1[1][l] *= s1[1];
+            f2[0][l] *= s2[0];
+            f2[1][l] *= s2[1];
+        }
+        in_front(&f1, &f2, &self.rotation, &self.translation, self.scales.parallel_sq)
     }
 
     #[inline]

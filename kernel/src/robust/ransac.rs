@@ -11,6 +11,12 @@ use crate::real::{from_u32, lit, max, min};
 /// How many locally optimised models a run keeps, best first.
 pub const KEPT: usize = 4;
 
+/// A sample's best hypothesis is optimised where it explains this share of what the best minimal model does: the
+/// best minimal model need not lie in the best basin.
+const SLACK: f64 = 0.7;
+/// As many near misses may be optimised at once; then one in 32 iterations.
+const NEAR_MISSES: u32 = 10;
+
 /// What a run found: models after local optimisation, best first, and how it went.
 #[derive(Clone, Copy, Debug)]
 pub struct Consensus<M, T> {
@@ -26,8 +32,8 @@ pub struct Consensus<M, T> {
 /// the smallest consensus of interest: it sharpens the sequential test while nothing has been found. `keep_going` is
 /// asked before every [`Guide::INTERVAL`]-th iteration.
 ///
-/// A hypothesis that beats all minimal models before it is optimised locally; the run ends once samples enough for
-/// the inliers of the best optimised model have been drawn.
+/// The best hypothesis of a sample is optimised locally where it comes near the best minimal model so far; the run
+/// ends once samples enough for the inliers of the best optimised model have been drawn.
 ///
 /// # References
 /// M. Fischler, R. Bolles, "Random sample consensus", Communications of the ACM, 1981.
@@ -41,6 +47,7 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
 ) -> Consensus<E::Model, T> {
     let count = estimator.count();
     let size = S as u32;
+    let all = from_u32::<T>(count);
     let mut sampler: Sampler<T> = match order {
         Some(_) => Sampler::ranked(options.seed, count, size),
         None => Sampler::uniform(options.seed, count),
@@ -50,6 +57,7 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
     let mut counts = ScoreCounts::default();
     let mut refined_residuals = 0u64;
     let mut minimal_cost = T::MAX;
+    let mut minimal_inliers = 0;
     let mut needed = u32::MAX;
     let mut gate = gate::<T>(T::MAX, least_inliers, count, &counts);
     let budget = options.budget;
@@ -84,14 +92,21 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
             }
         }
 
-        let mut leader = None;
+        // Near misses are optimised too, at a bounded rate.
+        let near = minimal_cost < T::MAX && spent.refinements < NEAR_MISSES + spent.iterations / 32;
+        let bound = if near { all - (all - minimal_cost) * lit(SLACK) } else { minimal_cost };
+        let mut leader: Option<(E::Model, Score<T>)> = None;
         let mut hypotheses = 0;
         let solved = estimator.generate(&sample, &mut |model| {
             hypotheses += 1;
-            gate.bound = minimal_cost;
+            gate.bound = bound;
             let score = estimator.score(model, &gate, &mut counts);
-            if let Some(score) = score.filter(|score| score.cost < minimal_cost) {
+            let Some(score) = score else { return };
+            if score.cost < minimal_cost {
                 minimal_cost = score.cost;
+                minimal_inliers = score.inliers;
+            }
+            if leader.is_none_or(|(_, best)| score.cost < best.cost) {
                 leader = Some((*model, score));
             }
         });
@@ -119,7 +134,7 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
         if leads {
             spent.inliers = candidate.1.inliers;
             needed = iterations_needed(options.confidence, spent.inliers, count, size);
-            gate = self::gate(minimal_cost, core::cmp::max(least_inliers, spent.inliers), count, &counts);
+            gate = self::gate(minimal_cost, core::cmp::max(least_inliers, minimal_inliers), count, &counts);
         }
     }
 

@@ -6,7 +6,7 @@ use crate::Real;
 use crate::geometry::Essential;
 use crate::linalg::{LANES, Lanes};
 use crate::real::{abs, lit, sqrt};
-use crate::refine::blocks::{BlockSlice, EpipolarBlock, in_front};
+use crate::refine::blocks::{BlockSlice, EpipolarBlock};
 use crate::refine::lm::{Manifold, minimise};
 use crate::refine::relative_pose::{PoseModel, Scales};
 use crate::robust::loss::Loss;
@@ -26,13 +26,16 @@ pub(super) struct PoseProblem<'a, T, B> {
 
 /// Blocks scored between two looks at the gate.
 const CHUNK: usize = 2;
-/// Passes over the data in one local optimisation.
+/// Passes over the data in the two stages of a local optimisation.
+const WIDE_PASSES: u32 = 5;
 const LOCAL_PASSES: u32 = 10;
 /// Rays closer to parallel than this many thresholds say nothing about depth.
 const PARALLEL: f64 = 1.0;
 
 impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
     pub(super) fn new(data: BlockSlice<'a, B>, scales: Scales<T>, threshold: T) -> Self {
+        let sine = threshold * lit(PARALLEL);
+        let scales = Scales { parallel_sq: sine * sine, ..scales };
         Self { data, scales, threshold, stride: stride(data.blocks.len()) }
     }
 
@@ -60,25 +63,12 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         squared
     }
 
-    /// The squared sine below which rays are parallel.
-    fn parallel_sq(&self) -> T {
-        let s = self.threshold * lit(PARALLEL);
-        s * s
-    }
-
     /// Squared residuals of a block in units of the squared threshold; of a point behind a camera, 1.
     #[inline(always)]
     fn squared_in_front(&self, block: &B, model: &PoseModel<T>, view: &View<T>) -> Lanes<T> {
         let mut squared = self.squared(block, &view.matrix, view.scale);
         if squared[0] < T::ONE || squared[1] < T::ONE || squared[2] < T::ONE || squared[3] < T::ONE {
-            let (mut f1, mut f2) = block.directions();
-            for l in 0..LANES {
-                f1[0][l] *= view.inverse1[0];
-                f1[1][l] *= view.inverse1[1];
-                f2[0][l] *= view.inverse2[0];
-                f2[1][l] *= view.inverse2[1];
-            }
-            let front = in_front(&f1, &f2, &model.rotation, &model.translation, view.parallel_sq);
+            let front = model.admits(block);
             for l in 0..LANES {
                 squared[l] = if front[l] { squared[l] } else { T::ONE };
             }
@@ -87,13 +77,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
     }
 
     fn view(&self, model: &PoseModel<T>) -> View<T> {
-        View {
-            matrix: model.matrix(),
-            scale: T::ONE / (self.threshold * self.threshold),
-            inverse1: self.scales.inverse1(),
-            inverse2: self.scales.inverse2(),
-            parallel_sq: self.parallel_sq(),
-        }
+        View { matrix: model.matrix(), scale: T::ONE / (self.threshold * self.threshold) }
     }
 
     /// Calls `each` with the squared residuals of every block in order, in units of the squared threshold, points
@@ -123,9 +107,6 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
 struct View<T: Real> {
     matrix: Matrix3<T>,
     scale: T,
-    inverse1: [T; 2],
-    inverse2: [T; 2],
-    parallel_sq: T,
 }
 
 /// A stride near the golden ratio of `blocks` and coprime to it: steps of it visit every block once, and early ones
@@ -205,9 +186,12 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
     }
 
     fn refine(&self, model: &PoseModel<T>, residuals: &mut u64) -> Option<PoseModel<T>> {
+        // A minimal model is off by more than the noise: inliers are gathered from twice the threshold first.
+        let wide = Loss::Truncated(self.threshold * T::TWO);
+        let first = self.optimise(model, &wide, WIDE_PASSES, lit(1e-3));
         let loss = Loss::Truncated(self.threshold);
-        let minimum = self.optimise(model, &loss, LOCAL_PASSES, lit(1e-4));
-        *residuals += minimum.passes as u64 * self.data.count as u64;
+        let minimum = self.optimise(&first.model, &loss, LOCAL_PASSES, lit(1e-4));
+        *residuals += (first.passes + minimum.passes) as u64 * self.data.count as u64;
         Some(minimum.model)
     }
 }

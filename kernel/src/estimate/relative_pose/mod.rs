@@ -180,7 +180,9 @@ fn estimate<T: Real, B: EpipolarBlock<T>>(
             report: consensus.report,
         };
     };
-    let minimum = problem.optimise(&model, &Loss::Truncated(problem.threshold), 10, lit(1e-6));
+    // What lies beyond two thresholds is an outlier; what lies between still helps, with a falling weight.
+    let loss = Loss::Tukey(problem.threshold * T::TWO);
+    let minimum = problem.optimise(&model, &loss, 10, lit(1e-6));
     let model = minimum.model;
     let mut mask = workspace.inliers.iter_mut();
     problem.for_each_block(&model, |_, squared, filled| {
