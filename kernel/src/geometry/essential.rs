@@ -6,7 +6,7 @@ use super::cheirality::depth_signs;
 use super::pose::{from_parts, skew};
 use super::{Fundamental, Pose};
 use crate::Real;
-use crate::linalg::svd3;
+use crate::linalg::least_singular3;
 use crate::real::{abs, is_finite, lit, max, sqrt};
 
 /// An essential matrix, known up to scale and sign.
@@ -74,13 +74,13 @@ impl<T: Real> Essential<T> {
     /// ```
     #[must_use]
     pub fn nearest(&self) -> Option<Self> {
-        let svd = svd3(&self.0)?;
-        if !(svd.s.y > lit::<T>(16.0) * T::EPSILON * svd.s.x) {
-            return None;
-        }
-        let s = (svd.s.x + svd.s.y) * T::HALF;
-        let (u, v) = (svd.u * s, svd.v);
-        Some(Self(u.column(0) * v.column(0).transpose() + u.column(1) * v.column(1).transpose()))
+        let (u3, v3) = least_singular3(&self.0)?;
+        // Without its third part, E is s1 u1 v1' + s2 u2 v2', and a quarter turn of both frames swaps s1 and s2.
+        let e = self.0 - (u3 * u3.dot(&(self.0 * v3))) * v3.transpose();
+        let [e0, e1, e2] = e.data.0.map(|c| u3.cross(&Vector3::from(c)));
+        let turned =
+            Matrix3::from_columns(&[e2 * v3.y - e1 * v3.z, e0 * v3.z - e2 * v3.x, e1 * v3.x - e0 * v3.y]);
+        Some(Self((e + turned) * T::HALF))
     }
 
     /// The two rotations and the baseline, without a singular value decomposition.

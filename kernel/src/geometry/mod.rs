@@ -13,6 +13,6 @@ mod whitening;
 pub use camera::{BrownConrady, Camera, CameraError, CameraModel, KannalaBrandt, Pinhole, UnprojectError};
 pub use essential::{CheiralPose, Essential, TwistedPair};
 pub use fundamental::Fundamental;
-pub use homography::Homography;
+pub use homography::{Homography, PlaneMotion};
 pub use pose::Pose;
 pub(crate) use whitening::Whitening;

@@ -101,7 +101,13 @@ pub fn cubic_roots<T: Real>(c: &[T; 4]) -> Solutions<T, 3> {
     } else {
         // One root: a bound beyond it.
         let root = cbrt(size);
-        if d > T::ZERO { root + d / root } else { min(size / (lit::<T>(3.0) * abs(d)), root) }
+        if d > T::ZERO {
+            root + d / root
+        } else if d < T::ZERO {
+            min(size / (lit::<T>(-3.0) * d), root)
+        } else {
+            root
+        }
     };
     let mut x = if q > T::ZERO { centre - start } else { centre + start };
     for _ in 0..MAX_STEPS {

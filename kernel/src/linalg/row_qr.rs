@@ -63,10 +63,15 @@ impl<T: Real, const N: usize> RowQr<T, N> {
     #[inline]
     pub fn fold<const B: usize>(&mut self, mut rows: [[T; N]; B]) {
         for k in 0..N {
-            let mut below = T::ZERO;
+            // Products of column k of the block with itself and with the columns after it, in one pass.
+            let mut dot = [T::ZERO; N];
             for row in &rows {
-                below += row[k] * row[k];
+                let v = row[k];
+                for j in k..N {
+                    dot[j] += v * row[j];
+                }
             }
+            let below = dot[k];
             if below == T::ZERO {
                 continue;
             }
@@ -77,18 +82,8 @@ impl<T: Real, const N: usize> RowQr<T, N> {
             let v0 = head - alpha;
             let scale = T::ONE / (alpha * v0);
             self.r[k][k] = alpha;
-            let mut dot = [T::ZERO; N];
             for j in k + 1..N {
-                dot[j] = v0 * self.r[k][j];
-            }
-            for row in &rows {
-                let v = row[k];
-                for j in k + 1..N {
-                    dot[j] += v * row[j];
-                }
-            }
-            for j in k + 1..N {
-                dot[j] *= scale;
+                dot[j] = (dot[j] + v0 * self.r[k][j]) * scale;
                 self.r[k][j] += v0 * dot[j];
             }
             for row in &mut rows {
@@ -100,16 +95,16 @@ impl<T: Real, const N: usize> RowQr<T, N> {
         }
     }
 
-    /// The right singular vector of the smallest singular value, by inverse iteration on a plane.
+    /// The right singular vector of the smallest singular value, by inverse iteration.
     ///
-    /// Two vectors are iterated with `(R'R)^-1`, so the error falls by the squared ratio of the smallest to the third
-    /// smallest singular value each time, and the smaller Ritz value of the plane is taken.
+    /// The error falls by the square of the ratio of the two smallest singular values each time: one or two iterations
+    /// where the matrix is nearly rank deficient.
     ///
     /// # Returns
-    /// `None` where `r` is zero, not finite, or so large that its squares are not. Compare `value` and `next_value` to judge the rank.
+    /// `None` where `r` is zero or not finite. Compare `value` and `next_value` to judge the rank.
     ///
     /// # Cost
-    /// Four iterations of four triangular solves.
+    /// At most 16 iterations, and one for `next_value`; two triangular solves each.
     #[inline]
     #[must_use]
     pub fn least_singular(&self) -> Option<LeastSingular<T, N>> {
@@ -125,71 +120,77 @@ impl<T: Real, const N: usize> RowQr<T, N> {
         if !(largest > T::ZERO) {
             return None;
         }
-        // Inverse iteration does not ask for the exact pivot of a singular factor, only for one that is not zero.
-        let floor = largest * T::EPSILON;
-        let mut inverse = [T::ZERO; N];
+        let mut solver = Self { r: self.r };
+        let scale = T::ONE / largest;
+        // Inverse iteration does not ask for the exact pivot of a singular factor, only for one that is not zero. The
+        // reciprocals of the pivots stand on the diagonal.
         for k in 0..N {
-            let d = self.r[k][k];
-            inverse[k] = T::ONE / if abs(d) > floor { d } else { floor };
+            for j in k..N {
+                solver.r[k][j] *= scale;
+            }
+            let d = solver.r[k][k];
+            solver.r[k][k] = T::ONE / if abs(d) > T::EPSILON { d } else { T::EPSILON };
         }
-        // Columns of [x0, x1]: a start without symmetry, so that no likely null vector is orthogonal to it.
-        let mut x = [[T::ZERO; 2]; N];
+        // Starts without symmetry, so that no likely null vector is orthogonal to them.
+        let mut x = [T::ZERO; N];
+        let mut y = [T::ZERO; N];
         for k in 0..N {
             let f: T = lit(k as f64);
-            let sign: T = if k % 2 == 0 { T::ONE } else { -T::ONE };
-            x[k] = [T::ONE + lit::<T>(0.17) * f, sign - lit::<T>(0.11) * f];
+            x[k] = T::ONE + lit::<T>(0.17) * f;
+            y[k] = if k % 2 == 0 { T::ONE } else { lit::<T>(0.11) * f - T::ONE };
         }
-        orthonormalise(&mut x)?;
-        for _ in 0..ITERATIONS {
-            // R' y = x, forwards, then R x = y, backwards.
-            for k in 0..N {
-                let y = x[k].map(|v| v * inverse[k]);
-                x[k] = y;
-                for j in k + 1..N {
-                    x[j] = [x[j][0] - self.r[k][j] * y[0], x[j][1] - self.r[k][j] * y[1]];
-                }
+        x = unit(&x)?;
+        let mut left = x;
+        let mut last_change = lit::<T>(4.0);
+        for _ in 0..MAX_ITERATIONS {
+            left = solver.solve_transposed(&x);
+            let next = unit(&solver.solve(&left))?;
+            let mut change = T::ZERO;
+            for (a, b) in next.iter().zip(&x) {
+                change += (*a - *b) * (*a - *b);
             }
-            orthonormalise(&mut x)?;
-            for k in (0..N).rev() {
-                let mut y = x[k];
-                for j in k + 1..N {
-                    y = [y[0] - self.r[k][j] * x[j][0], y[1] - self.r[k][j] * x[j][1]];
-                }
-                x[k] = y.map(|v| v * inverse[k]);
+            x = next;
+            // The change shrinks by the same factor each time: the next one would be below rounding.
+            let enough = lit::<T>(4.0) * T::EPSILON;
+            if change * change <= enough * enough * last_change {
+                break;
             }
-            orthonormalise(&mut x)?;
+            last_change = change;
         }
-        // Ritz: the 2x2 matrix of R on the plane, its right singular vectors by one rotation.
-        let (mut a, mut b, mut c) = (T::ZERO, T::ZERO, T::ZERO);
+        // The same on what is orthogonal to both singular vectors found.
+        let left = unit(&left)?;
+        y = unit(&without(&y, &x))?;
+        y = unit(&without(&solver.solve_transposed(&y), &left))?;
+        y = unit(&without(&solver.solve(&y), &x))?;
+        Some(LeastSingular { vector: x, value: self.stretch(&x), next_value: self.stretch(&y) })
+    }
+
+    /// `R^-T x`, where the reciprocals of the pivots stand on the diagonal of `r`.
+    #[inline]
+    fn solve_transposed(&self, x: &[T; N]) -> [T; N] {
+        let mut x = *x;
         for k in 0..N {
-            let mut y = [T::ZERO; 2];
-            for j in k..N {
-                y = [y[0] + self.r[k][j] * x[j][0], y[1] + self.r[k][j] * x[j][1]];
+            let y = x[k] * self.r[k][k];
+            x[k] = y;
+            for j in k + 1..N {
+                x[j] -= self.r[k][j] * y;
             }
-            a += y[0] * y[0];
-            b += y[0] * y[1];
-            c += y[1] * y[1];
         }
-        let half = (c - a) * T::HALF;
-        let root = sqrt(half * half + b * b);
-        // tan of the rotation, the smaller of the two angles.
-        let t = if root > T::ZERO { b / (abs(half) + root) } else { T::ZERO };
-        let cos = T::ONE / sqrt(T::ONE + t * t);
-        let sin = t * cos;
-        let mut vectors = [[T::ZERO; N]; 2];
-        let sin = if half > T::ZERO { -sin } else { sin };
-        for k in 0..N {
-            vectors[0][k] = cos * x[k][0] + sin * x[k][1];
-            vectors[1][k] = cos * x[k][1] - sin * x[k][0];
+        x
+    }
+
+    /// `R^-1 x`, where the reciprocals of the pivots stand on the diagonal of `r`.
+    #[inline]
+    fn solve(&self, x: &[T; N]) -> [T; N] {
+        let mut x = *x;
+        for k in (0..N).rev() {
+            let y = x[k] * self.r[k][k];
+            x[k] = y;
+            for j in 0..k {
+                x[j] -= self.r[j][k] * y;
+            }
         }
-        let value = [self.stretch(&vectors[0]), self.stretch(&vectors[1])];
-        let least = if value[0] <= value[1] { 0 } else { 1 };
-        let finite = is_finite(value[0]) && is_finite(value[1]);
-        finite.then_some(LeastSingular {
-            vector: vectors[least],
-            value: value[least],
-            next_value: value[1 - least],
-        })
+        x
     }
 
     /// `|R x|`
@@ -206,44 +207,29 @@ impl<T: Real, const N: usize> RowQr<T, N> {
     }
 }
 
-const ITERATIONS: u32 = 4;
+const MAX_ITERATIONS: u32 = 16;
 
-/// Gram-Schmidt on two columns, the second twice (it may lie almost along the first).
-fn orthonormalise<T: Real, const N: usize>(x: &mut [[T; 2]; N]) -> Option<()> {
-    // Scaled first: the solves may have made the elements as large as 1 / EPSILON^2.
-    let mut largest = [T::ZERO; 2];
-    for row in x.iter() {
-        largest = [max(largest[0], abs(row[0])), max(largest[1], abs(row[1]))];
+fn dot<T: Real, const N: usize>(a: &[T; N], b: &[T; N]) -> T {
+    let mut sum = T::ZERO;
+    for (a, b) in a.iter().zip(b) {
+        sum += *a * *b;
     }
-    if !(largest[0] > T::ZERO && largest[1] > T::ZERO && largest[0] <= T::MAX && largest[1] <= T::MAX) {
-        return None;
+    sum
+}
+
+/// `None` for a vector of length zero or one that is not finite.
+fn unit<T: Real, const N: usize>(x: &[T; N]) -> Option<[T; N]> {
+    let norm = sqrt(dot(x, x));
+    let inverse = T::ONE / norm;
+    (norm > T::ZERO && norm <= T::MAX).then(|| x.map(|v| v * inverse))
+}
+
+/// The part of `y` that is orthogonal to the unit vector `x`.
+fn without<T: Real, const N: usize>(y: &[T; N], x: &[T; N]) -> [T; N] {
+    let along = dot(x, y);
+    let mut result = *y;
+    for (y, x) in result.iter_mut().zip(x) {
+        *y -= along * *x;
     }
-    let scale = [T::ONE / largest[0], T::ONE / largest[1]];
-    let mut norm_sq = T::ZERO;
-    for row in x.iter_mut() {
-        *row = [row[0] * scale[0], row[1] * scale[1]];
-        norm_sq += row[0] * row[0];
-    }
-    let inverse = T::ONE / sqrt(norm_sq);
-    for row in x.iter_mut() {
-        row[0] *= inverse;
-    }
-    for _ in 0..2 {
-        let (mut dot, mut norm_sq) = (T::ZERO, T::ZERO);
-        for row in x.iter() {
-            dot += row[0] * row[1];
-        }
-        for row in x.iter_mut() {
-            row[1] -= dot * row[0];
-            norm_sq += row[1] * row[1];
-        }
-        if !(norm_sq > T::ZERO) {
-            return None;
-        }
-        let inverse = T::ONE / sqrt(norm_sq);
-        for row in x.iter_mut() {
-            row[1] *= inverse;
-        }
-    }
-    Some(())
+    result
 }
