@@ -75,6 +75,10 @@ macro_rules! export {
 export! {
     bench_5pt_f32 bench_5pt_f64: relpose_5pt;
     bench_5ptpose_f32 bench_5ptpose_f64: relpose_5pt_poses;
+    bench_7pt_f32 bench_7pt_f64: relpose_7pt;
+    bench_8pt_f32 bench_8pt_f64: relpose_8pt_of_8;
+    bench_8pt20_f32 bench_8pt20_f64: relpose_8pt_of_20;
+    bench_h4_f32 bench_h4_f64: homography_4pt;
     bench_edecomp_f32 bench_edecomp_f64: pose_by_cheirality;
     bench_trimid_f32 bench_trimid_f64: triangulate_midpoint;
     bench_tridlt_f32 bench_tridlt_f64: triangulate_dlt;
@@ -88,6 +92,34 @@ unsafe fn relpose_5pt<T: Real>(a: *const T, b: *const T, out: *mut T) -> i32 {
 unsafe fn relpose_5pt_poses<T: Real>(a: *const T, b: *const T, out: *mut T) -> i32 {
     // SAFETY: five bearings each, at most ten solutions.
     unsafe { put_poses(out, solvers::relpose_5pt_poses(&bearings(a), &bearings(b))) }
+}
+
+unsafe fn relpose_7pt<T: Real>(a: *const T, b: *const T, out: *mut T) -> i32 {
+    // SAFETY: seven bearings each, at most three solutions.
+    unsafe { put(out, solvers::relpose_7pt(&bearings(a), &bearings(b)).into_iter().map(|f| f.0)) }
+}
+
+unsafe fn relpose_8pt<T: Real, const N: usize>(a: *const T, b: *const T, out: *mut T) -> i32 {
+    // SAFETY: N bearings each, at most one solution.
+    unsafe {
+        let e = solvers::relpose_8pt(&bearings::<T, N>(a), &bearings::<T, N>(b));
+        put(out, e.ok().flatten().map(|e| e.0))
+    }
+}
+
+unsafe fn relpose_8pt_of_8<T: Real>(a: *const T, b: *const T, out: *mut T) -> i32 {
+    // SAFETY: passed on to the caller.
+    unsafe { relpose_8pt::<T, 8>(a, b, out) }
+}
+
+unsafe fn relpose_8pt_of_20<T: Real>(a: *const T, b: *const T, out: *mut T) -> i32 {
+    // SAFETY: passed on to the caller.
+    unsafe { relpose_8pt::<T, 20>(a, b, out) }
+}
+
+unsafe fn homography_4pt<T: Real>(a: *const T, b: *const T, out: *mut T) -> i32 {
+    // SAFETY: four bearings each, at most one solution.
+    unsafe { put(out, solvers::homography_4pt(&bearings(a), &bearings(b)).map(|h| h.0)) }
 }
 
 /// An essential matrix, row-major, and five bearings of each view, to the pose that has all of them in front.
