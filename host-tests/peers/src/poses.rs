@@ -14,20 +14,25 @@ unsafe fn vectors<T: Real, const N: usize>(p: *const T) -> [Vector3<T>; N] {
     core::array::from_fn(|i| Vector3::new(p[3 * i], p[3 * i + 1], p[3 * i + 2]))
 }
 
-/// Writes R row-major and t of each pose; the count.
+/// Writes R row-major, then t.
+pub(crate) fn write_pose<T: Real>(pose: &Pose<T>, out: &mut [T]) {
+    let r = pose.rotation.to_rotation_matrix().into_inner();
+    for i in 0..3 {
+        for j in 0..3 {
+            out[3 * i + j] = r[(i, j)];
+        }
+        out[9 + i] = pose.translation.vector[i];
+    }
+}
+
+/// Writes poses one after the other; how many there were.
 ///
 /// # Safety
 /// `out` has room for 12 numbers a pose.
 unsafe fn write_poses<T: Real>(poses: &[Pose<T>], out: *mut T) -> i32 {
     let out = unsafe { slice::from_raw_parts_mut(out, 12 * poses.len()) };
     for (pose, out) in poses.iter().zip(out.chunks_exact_mut(12)) {
-        let r = pose.rotation.to_rotation_matrix().into_inner();
-        for i in 0..3 {
-            for j in 0..3 {
-                out[3 * i + j] = r[(i, j)];
-            }
-            out[9 + i] = pose.translation.vector[i];
-        }
+        write_pose(pose, out);
     }
     poses.len() as i32
 }

@@ -288,6 +288,46 @@ pub fn nearest_rotation<T: Real>(m: &Matrix3<T>) -> Option<Matrix3<T>> {
     unique.then(|| u * Matrix3::from_diagonal(&Vector3::new(T::ONE, T::ONE, sign)) * v.transpose())
 }
 
+/// The rotation that turns a frame until the direction `gravity` of it lies along +y: `R gravity ~ (0, 1, 0)`, by the
+/// smallest angle. It makes the upright frames that the upright solvers want.
+///
+/// None for a vector of length zero or one that is not finite.
+///
+/// # Examples
+/// ```
+/// use epipole::geometry::pose::upright;
+/// use epipole::nalgebra::Vector3;
+/// let gravity = Vector3::new(0.1, 0.9, -0.4);
+/// let turned = upright(&gravity).unwrap() * gravity.normalize();
+/// assert!((turned - Vector3::y()).norm() < 1e-15);
+/// ```
+#[must_use]
+pub fn upright<T: Real>(gravity: &Vector3<T>) -> Option<Matrix3<T>> {
+    let largest = max(max(abs(gravity.x), abs(gravity.y)), abs(gravity.z));
+    if !(largest > T::ZERO && largest <= T::MAX) {
+        return None;
+    }
+    let g = gravity * (T::ONE / largest);
+    let mut g = g * (T::ONE / sqrt(g.norm_squared()));
+    // Half a turn about x first where the angle is obtuse.
+    let obtuse = g.y < T::ZERO;
+    if obtuse {
+        g = Vector3::new(g.x, -g.y, -g.z);
+    }
+    // I + [v]x + [v]x^2 / (1 + c) with v = g x y = (-g.z, 0, g.x)
+    let k = T::ONE / (T::ONE + g.y);
+    let (x, z) = (g.x, g.z);
+    let mut r =
+        Matrix3::new(T::ONE - k * x * x, -x, -k * x * z, x, g.y, z, -k * x * z, -z, T::ONE - k * z * z);
+    if obtuse {
+        for i in 0..3 {
+            r[(i, 1)] = -r[(i, 1)];
+            r[(i, 2)] = -r[(i, 2)];
+        }
+    }
+    Some(r)
+}
+
 /// The rotation about the y axis by the angle whose cosine and sine are `c` and `s`: `x' = c x + s z`,
 /// `z' = c z - s x`. `(c, s)` must be a unit vector; it is not checked.
 #[inline]

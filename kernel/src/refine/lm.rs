@@ -181,10 +181,27 @@ where
     B: EpipolarBlock<T>,
     M: Manifold<T, P>,
 {
-    let mut best = Minimum { model: *start, equations: normal_equations(data, start, loss), passes: 1 };
+    descend(start, P as u32, max_passes, tolerance, |model| normal_equations(data, model, loss), M::retract)
+}
+
+/// [`minimise`] for any normal equations and retraction; nothing moves where fewer than `least_active` residuals have
+/// a weight.
+pub(crate) fn descend<T, M, const P: usize>(
+    start: &M,
+    least_active: u32,
+    max_passes: u32,
+    tolerance: T,
+    normal_equations: impl Fn(&M) -> NormalEquations<T, P>,
+    retract: impl Fn(&M, &SVector<T, P>) -> M,
+) -> Minimum<M, T, P>
+where
+    T: Real,
+    M: Copy,
+{
+    let mut best = Minimum { model: *start, equations: normal_equations(start), passes: 1 };
     let mut damping: T = lit(1e-4);
     while best.passes < max_passes {
-        if (best.equations.active as usize) < P {
+        if best.equations.active < least_active {
             break;
         }
         let mut damped = best.equations.hessian;
@@ -198,8 +215,8 @@ where
             continue;
         };
         let step = -factors.solve(&best.equations.gradient);
-        let model = best.model.retract(&step);
-        let equations = normal_equations(data, &model, loss);
+        let model = retract(&best.model, &step);
+        let equations = normal_equations(&model);
         best.passes += 1;
         let (old, new) = (best.equations.cost, equations.cost);
         if new < old {
