@@ -4,5 +4,3 @@ pub(crate) mod blocks;
 pub(crate) mod lm;
 pub(crate) mod relative_pose;
 pub(crate) mod reprojection;
-
-pub use relative_pose::tangent_basis;
