@@ -90,4 +90,12 @@ impl<T: Real> Whitening<T> {
             self.iz,
         )
     }
+
+    /// `T^-1`
+    #[inline]
+    pub(crate) fn inverse_matrix(&self) -> Matrix3<T> {
+        let o = T::ZERO;
+        let (x, y, z) = (T::ONE / self.ix, T::ONE / self.iy, T::ONE / self.iz);
+        Matrix3::new(x, o, self.a * z, self.c * x, y, (self.b + self.c * self.a) * z, o, o, z)
+    }
 }

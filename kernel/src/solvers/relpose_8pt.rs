@@ -2,9 +2,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::input::{check_lengths, no_solution};
 use crate::geometry::{Essential, Fundamental, Whitening};
 use crate::linalg::{RowQr, null_space};
-use crate::real::lit;
+use crate::real::{lit, sqrt};
 use crate::{InputError, Real};
 
 /// Rows that one set of reflections folds into the triangular factor.
@@ -57,14 +58,14 @@ pub fn relpose_8pt<T: Real>(
     x1: &[Vector3<T>],
     x2: &[Vector3<T>],
 ) -> Result<Option<Essential<T>>, InputError> {
-    check_lengths(x1, x2)?;
+    check_lengths(x1, x2, 8)?;
     let estimate = linear_estimate(x1, x2).and_then(|(f, t1, t2)| {
         let (t1, t2) = (t1.matrix(), t2.matrix());
         Essential(t2.transpose() * f * t1).nearest()
     });
     match estimate {
         Some(Essential(e)) => Ok(unit(&e).map(Essential)),
-        None => check_finite(x1, x2).map(|()| None),
+        None => no_solution(x1, x2),
     }
 }
 
@@ -111,14 +112,14 @@ pub fn fundamental_8pt<T: Real>(
     x1: &[Vector3<T>],
     x2: &[Vector3<T>],
 ) -> Result<Option<Fundamental<T>>, InputError> {
-    check_lengths(x1, x2)?;
+    check_lengths(x1, x2, 8)?;
     let estimate = linear_estimate(x1, x2).and_then(|(f, t1, t2)| {
         let f = Fundamental(f).nearest()?.0;
         unit(&(t2.matrix().transpose() * f * t1.matrix()))
     });
     match estimate {
         Some(f) => Ok(Some(Fundamental(f))),
-        None => check_finite(x1, x2).map(|()| None),
+        None => no_solution(x1, x2),
     }
 }
 
@@ -177,29 +178,6 @@ fn rows<T: Real, const B: usize>(
 /// The matrix scaled to Frobenius norm 1.
 #[inline]
 fn unit<T: Real>(m: &Matrix3<T>) -> Option<Matrix3<T>> {
-    let norm = crate::real::sqrt(m.norm_squared());
+    let norm = sqrt(m.norm_squared());
     (norm > T::ZERO && norm <= T::MAX).then(|| m / norm)
-}
-
-fn check_lengths<T: Real>(x1: &[Vector3<T>], x2: &[Vector3<T>]) -> Result<(), InputError> {
-    if x1.len() != x2.len() {
-        return Err(InputError::LengthMismatch { first: x1.len(), second: x2.len() });
-    }
-    if x1.len() < 8 {
-        return Err(InputError::TooFew { given: x1.len(), needed: 8 });
-    }
-    Ok(())
-}
-
-/// Asked only where the estimate failed: no coordinate that is not finite passes through it.
-#[cold]
-fn check_finite<T: Real>(x1: &[Vector3<T>], x2: &[Vector3<T>]) -> Result<(), InputError> {
-    for (array, points) in [x1, x2].into_iter().enumerate() {
-        for (index, p) in points.iter().enumerate() {
-            if !p.iter().all(|&x| crate::real::is_finite(x)) {
-                return Err(InputError::NotFinite { array, index });
-            }
-        }
-    }
-    Ok(())
 }

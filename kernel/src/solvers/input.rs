@@ -1,0 +1,35 @@
+//! What the solvers of any number of correspondences ask of their input.
+
+use nalgebra::Vector3;
+
+use crate::real::is_finite;
+use crate::{InputError, Real};
+
+/// As many points in both views, and no fewer than `needed`.
+pub(super) fn check_lengths<T: Real>(
+    x1: &[Vector3<T>],
+    x2: &[Vector3<T>],
+    needed: usize,
+) -> Result<(), InputError> {
+    if x1.len() != x2.len() {
+        return Err(InputError::LengthMismatch { first: x1.len(), second: x2.len() });
+    }
+    if x1.len() < needed {
+        return Err(InputError::TooFew { given: x1.len(), needed });
+    }
+    Ok(())
+}
+
+/// Why a solver has no solution: an error where a coordinate is not finite, else degenerate points. Asked only after the
+/// solver has failed, as it does where a coordinate is not finite.
+#[cold]
+pub(super) fn no_solution<T: Real, S>(x1: &[Vector3<T>], x2: &[Vector3<T>]) -> Result<Option<S>, InputError> {
+    for (array, points) in [x1, x2].into_iter().enumerate() {
+        for (index, p) in points.iter().enumerate() {
+            if !(is_finite(p.x) && is_finite(p.y) && is_finite(p.z)) {
+                return Err(InputError::NotFinite { array, index });
+            }
+        }
+    }
+    Ok(None)
+}
