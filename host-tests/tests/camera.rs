@@ -309,6 +309,8 @@ in_both_scalars! {
         }
         let Camera::BrownConrady(barrel) = LENSES[3].camera::<T>() else { panic!() };
         assert!((barrel.max_radius().to_f64() - (1.0f64 / 1.05).sqrt()).abs() < 1e-6);
+        let texts = [UnprojectError::NotFinite, UnprojectError::OutsideDomain, UnprojectError::NotConverged];
+        assert!(texts.map(|e| e.to_string().contains("pixel")).iter().all(|found| *found));
         for lens in LENSES {
             for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
                 let pixel = Vector2::new(T::ZERO, lit(bad));
@@ -341,6 +343,8 @@ in_both_scalars! {
             assert_eq!(KannalaBrandt::new(pinhole, d), Err(not_finite(name)));
         }
         assert_eq!(not_finite("k2").to_string(), "camera parameter k2 is not finite");
+        let not_positive = CameraError::NotPositive { parameter: "fx" };
+        assert_eq!(not_positive.to_string(), "camera parameter fx is not positive");
     }
 
     fn the_matrix_is_the_pinhole<T>() {

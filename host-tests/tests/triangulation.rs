@@ -469,6 +469,9 @@ let bound = if name == "dlt" { tolerances::DLT_ORIGIN } else { tolerances::TRIAN
         let nowhere = Vector3::from_element(lit(f64::NAN));
         assert_eq!(error(&views, &pixels, &nowhere), input(InputError::NotFinite { array: 2, index: 0 }));
         assert_eq!(error(&views, &pixels, &-start), RefinePointError::NotVisible { view: 0 });
+        assert_eq!(RefinePointError::NotVisible { view: 1 }.to_string(), "view 1 does not see the start");
+        assert_eq!(RefinePointError::Unobservable.to_string(), "the views do not determine the point");
+        assert_eq!(input(InputError::TooFew { given: 1, needed: 2 }).to_string(), "1 correspondences given, 2 needed");
         // The same view twice: no depth.
         let twice = [view(0.0), view(0.0)];
         let same = refine_point(&twice, &pixels, &start);

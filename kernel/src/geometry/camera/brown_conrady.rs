@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, SMatrix, Vector2, Vector3};
 
-use super::pinhole::plane_point;
+use super::pinhole::{plane_jacobian, plane_point};
 use super::{CameraError, CameraModel, Pinhole, UnprojectError, bearing_of_plane_point, finite, first_root};
 use crate::Real;
 use crate::real::{is_finite, lit, sqrt};
@@ -177,7 +177,7 @@ impl<T: Real> BrownConrady<T> {
     #[must_use]
     pub fn intrinsics_jacobian(&self, point: &Vector3<T>) -> Option<SMatrix<T, 2, 9>> {
         self.project(point)?;
-        let x = Vector2::new(point.x / point.z, point.y / point.z);
+        let (x, _) = plane_point(point)?;
         let d = self.distort(&x)?;
         let (s, o, i) = (x.norm_squared(), T::ZERO, T::ONE);
         let (fx, fy) = (self.pinhole.fx(), self.pinhole.fy());
@@ -214,20 +214,18 @@ impl<T: Real> BrownConrady<T> {
 impl<T: Real> CameraModel<T> for BrownConrady<T> {
     #[inline]
     fn project(&self, point: &Vector3<T>) -> Option<Vector2<T>> {
-        if !(point.z > T::ZERO && point.z <= T::MAX) {
-            return None;
-        }
-        let x = Vector2::new(point.x / point.z, point.y / point.z);
+        let (x, _) = plane_point(point)?;
         let pixel = self.pinhole.to_pixel(&self.distort(&x)?);
         finite(pixel, pixel.as_slice())
     }
 
     #[inline]
     fn project_with_jacobian(&self, point: &Vector3<T>) -> Option<(Vector2<T>, Matrix2x3<T>)> {
-        let pixel = self.project(point)?;
-        let (x, by_point) = plane_point(point);
+        let (x, w) = plane_point(point)?;
         let d = self.distort_with_jacobian(&x)?;
-        let jacobian = self.pinhole.scale_rows(&(d.jacobian * by_point));
+        let pixel = self.pinhole.to_pixel(&d.point);
+        let jacobian = self.pinhole.scale_rows(&(d.jacobian * plane_jacobian(&x, w)));
+        finite(pixel, pixel.as_slice())?;
         finite((pixel, jacobian), jacobian.as_slice())
     }
 

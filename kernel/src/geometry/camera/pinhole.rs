@@ -110,35 +110,45 @@ impl<T: Real> Pinhole<T> {
     #[must_use]
     pub fn intrinsics_jacobian(&self, point: &Vector3<T>) -> Option<Matrix2x4<T>> {
         self.project(point)?;
+        let (p, _) = plane_point(point)?;
         let (o, i) = (T::ZERO, T::ONE);
-        let j = Matrix2x4::new(point.x / point.z, o, i, o, o, point.y / point.z, o, i);
+        let j = Matrix2x4::new(p.x, o, i, o, o, p.y, o, i);
         finite(j, j.as_slice())
     }
 }
 
-/// The point of the plane z = 1 and its Jacobian by the point; the caller has checked `z > 0`.
+/// The point of the plane z = 1 and 1/z; none behind the camera. One division: it is the slowest operation of a small
+/// core.
 #[inline]
-pub(super) fn plane_point<T: Real>(point: &Vector3<T>) -> (Vector2<T>, Matrix2x3<T>) {
+pub(super) fn plane_point<T: Real>(point: &Vector3<T>) -> Option<(Vector2<T>, T)> {
+    // Also false for NaN and infinity.
+    if !(point.z > T::ZERO && point.z <= T::MAX) {
+        return None;
+    }
     let w = T::ONE / point.z;
-    let p = Vector2::new(point.x / point.z, point.y / point.z);
-    (p, Matrix2x3::new(w, T::ZERO, -p.x * w, T::ZERO, w, -p.y * w))
+    Some((Vector2::new(point.x * w, point.y * w), w))
+}
+
+/// The Jacobian of the point `p` of the plane z = 1 by the point in space, `w = 1/z`.
+#[inline]
+pub(super) fn plane_jacobian<T: Real>(p: &Vector2<T>, w: T) -> Matrix2x3<T> {
+    Matrix2x3::new(w, T::ZERO, -p.x * w, T::ZERO, w, -p.y * w)
 }
 
 impl<T: Real> CameraModel<T> for Pinhole<T> {
     #[inline]
     fn project(&self, point: &Vector3<T>) -> Option<Vector2<T>> {
-        // `point.z` is finite where z > 0 and the pixel is finite, but for z = +inf, which is refused here.
-        if !(point.z > T::ZERO && point.z <= T::MAX) {
-            return None;
-        }
-        let pixel = self.to_pixel(&Vector2::new(point.x / point.z, point.y / point.z));
+        let (p, _) = plane_point(point)?;
+        let pixel = self.to_pixel(&p);
         finite(pixel, pixel.as_slice())
     }
 
     #[inline]
     fn project_with_jacobian(&self, point: &Vector3<T>) -> Option<(Vector2<T>, Matrix2x3<T>)> {
-        let pixel = self.project(point)?;
-        let jacobian = self.scale_rows(&plane_point(point).1);
+        let (p, w) = plane_point(point)?;
+        let pixel = self.to_pixel(&p);
+        let jacobian = self.scale_rows(&plane_jacobian(&p, w));
+        finite(pixel, pixel.as_slice())?;
         finite((pixel, jacobian), jacobian.as_slice())
     }
 
