@@ -1,0 +1,169 @@
+//! Judges epipole's robust estimators on correspondence files with ground truth.
+//!
+//! `cargo run --release --bin evaluate -- relative-pose PATH...`, where a path is a file, or a folder that is searched
+//! for `.txt` files. The format of the files is described in `file.rs` and by `--help`.
+
+mod file;
+mod plot;
+mod report;
+mod run;
+mod score;
+
+use std::fs;
+use std::io::{self, IsTerminal};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Parser, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use file::Problem;
+use run::Settings;
+
+const FORMAT: &str = "\
+Format of a file, one item a line; lines that start with `#` are skipped, but `# size W H` gives the size of image 1:
+  K1 fx fy cx cy        intrinsics in pixels, no distortion
+  K2 fx fy cx cy
+  R_gt r11 r12 .. r33   the true pose, row-major: x2 ~ K2 (R_gt X1 + t_gt); only the direction of t_gt counts
+  t_gt tx ty tz
+  n N                   then N lines:
+  x1 y1 x2 y2 score     pixels, the centre of the top-left pixel being (0, 0); a lower score is better, and it may be
+                        left out
+The correspondences are shuffled before they are used.
+
+Errors: rotation and direction of translation in degrees, by the chord. A file fails above 5 degrees; a refusal is a
+failure.
+
+Exit code: 0; 1 if nothing could be evaluated; 2 for a wrong command line; 3 if some file was broken and skipped.";
+
+#[derive(Parser)]
+#[command(name = "evaluate", version, about = "Judge the robust estimators on files with ground truth", after_help = FORMAT)]
+struct Arguments {
+    /// What to estimate.
+    problem: Problem,
+    /// Files, or folders searched for .txt files.
+    #[arg(required = true, value_name = "PATH")]
+    paths: Vec<PathBuf>,
+    /// Scalar of the estimation.
+    #[arg(long, default_value = "f64")]
+    scalar: Scalar,
+    /// Use only the best N correspondences by score.
+    #[arg(long, value_name = "N")]
+    max_corr: Option<usize>,
+    /// Largest error of an inlier in pixels [default: 1, or 2 for images wider than 2000]
+    #[arg(long, value_name = "PX", allow_negative_numbers = true)]
+    threshold: Option<f64>,
+    /// Probability that a sample of inliers only is drawn [default: the estimator's].
+    #[arg(long, value_name = "P", allow_negative_numbers = true)]
+    confidence: Option<f64>,
+    /// Most samples drawn [default: the estimator's].
+    #[arg(long, value_name = "N")]
+    max_iterations: Option<u32>,
+    /// Seed of the shuffling and of the estimator.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Write one line a file.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Draw the cumulative error curves (SVG).
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Scalar {
+    F32,
+    F64,
+}
+
+fn main() -> ExitCode {
+    match evaluate(&Arguments::parse()) {
+        Ok(code) => code,
+        Err(reason) => {
+            eprintln!("error: {reason}");
+            ExitCode::from(1)
+        }
+    }
+}
+
+fn evaluate(arguments: &Arguments) -> Result<ExitCode, String> {
+    let problem = arguments.problem;
+    let settings = Settings {
+        threshold_px: arguments.threshold,
+        confidence: arguments.confidence,
+        max_iterations: arguments.max_iterations,
+        max_correspondences: arguments.max_corr,
+        seed: arguments.seed,
+    };
+    if let Some(path) = &arguments.plot
+        && !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("svg"))
+    {
+        return Err(format!("{}: the plot is an SVG, name it .svg", path.display()));
+    }
+    let mut paths = Vec::new();
+    for path in &arguments.paths {
+        collect(path, &mut paths).map_err(|e| format!("{}: {e}", path.display()))?;
+    }
+    if paths.is_empty() {
+        return Err("no .txt file in the folders given".into());
+    }
+
+    let progress = ProgressBar::new(paths.len() as u64);
+    let style = "{bar:40.green/black} {pos}/{len} {eta} {msg}";
+    progress.set_style(ProgressStyle::with_template(style).map_err(|e| e.to_string())?);
+    if !io::stderr().is_terminal() {
+        progress.set_draw_target(indicatif::ProgressDrawTarget::hidden());
+    }
+    let mut outcomes = Vec::new();
+    let mut broken = 0usize;
+    for path in &paths {
+        progress.set_message(report::scene(path));
+        match file::read(path) {
+            Ok(file) => {
+                let outcome = match arguments.scalar {
+                    Scalar::F32 => run::run::<f32>(problem, &file, &settings),
+                    Scalar::F64 => run::run::<f64>(problem, &file, &settings),
+                };
+                outcomes.push((path.clone(), outcome));
+            }
+            Err(why) => {
+                broken += 1;
+                progress.suspend(|| eprintln!("skipped {why}"));
+            }
+        }
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+
+    if outcomes.is_empty() {
+        return Err("no file could be evaluated".into());
+    }
+    let named = |path: &Path, e: io::Error| format!("{}: {e}", path.display());
+    if let Some(path) = &arguments.csv {
+        report::write_csv(path, problem, &outcomes).map_err(|e| named(path, e))?;
+    }
+    if let Some(path) = &arguments.plot {
+        plot::write_svg(path, problem, &outcomes).map_err(|e| format!("{}: {e}", path.display()))?;
+    }
+    report::print(problem, &outcomes);
+    Ok(ExitCode::from(if broken > 0 { 3 } else { 0 }))
+}
+
+/// The file itself, or every `.txt` file below a folder, in order of their names.
+fn collect(path: &Path, out: &mut Vec<PathBuf>) -> io::Result<()> {
+    if !path.is_dir() {
+        fs::metadata(path)?;
+        out.push(path.into());
+        return Ok(());
+    }
+    let mut entries = fs::read_dir(path)?.map(|e| e.map(|e| e.path())).collect::<io::Result<Vec<_>>>()?;
+    entries.sort();
+    for entry in entries {
+        if entry.is_dir() {
+            collect(&entry, out)?;
+        } else if entry.extension().is_some_and(|e| e == "txt") {
+            out.push(entry);
+        }
+    }
+    Ok(())
+}
