@@ -4,7 +4,8 @@ use epipole::geometry::triangulation::{
     Triangulation, View, ViewPair, depth_sigma, point_covariance, refine_point, triangulate_dlt,
 };
 use epipole::geometry::{
-    BrownConrady, Camera, CameraModel, Essential, KannalaBrandt, Pinhole, Pose, pose as p, residual,
+    BrownConrady, Camera, CameraModel, Essential, Fundamental, Homography, KannalaBrandt, Pinhole, Pose,
+    pose as p, residual,
 };
 use epipole::nalgebra::{Vector3, Vector6};
 use epipole::{Real, real::lit};
@@ -226,5 +227,38 @@ pub(crate) fn many_view_triangulation<T: Real>(source: &mut Source<'_>, sink: &m
     let jacobians = [source.matrix::<T, 2, 3>(), source.matrix()];
     if let Some(covariance) = point_covariance(&jacobians, source.positive()) {
         sink.finite(&covariance);
+    }
+}
+
+pub(crate) fn homography<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
+    let h = Homography(source.matrix::<T, 3, 3>());
+    let (k1, k2) = (source.matrix(), source.matrix());
+    sink.flag(h.to_pixels(&k1, &k2).is_some());
+    sink.flag(h.to_normalised(&k1, &k2).is_some());
+    if let Some(point) = h.transfer(&source.vector2()) {
+        sink.finite(&point);
+    }
+    if let Some(inverse) = h.inverse() {
+        sink.finite(&inverse.0);
+    }
+    let motions = h.visible_motions(&source.vectors::<T, 3>());
+    sink.count(motions.len());
+    for motion in h.motions().iter().chain(&motions) {
+        sink.finite_pose(&motion.pose);
+        sink.finite(&motion.normal);
+        sink.numbers(&motion.homography().0);
+    }
+}
+
+pub(crate) fn fundamental<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
+    let f = Fundamental(source.matrix::<T, 3, 3>());
+    let x = source.vector3();
+    sink.numbers(&f.line1(&x));
+    sink.numbers(&f.line2(&x));
+    for epipole in [f.epipole1(), f.epipole2()].iter().flatten() {
+        sink.finite(epipole);
+    }
+    if let Some(nearest) = f.nearest() {
+        sink.finite(&nearest.0);
     }
 }

@@ -38,6 +38,6 @@ macro_rules! capabilities {
 /// Every capability.
 pub const CAPABILITIES: &[Capability] = capabilities! {
     linalg: scalar null_space row_qr lu ldlt symmetric_eigen svd3 polynomials;
-    geometry: pose rotations pinhole brown_conrady kannala_brandt any_camera residuals two_view_triangulation many_view_triangulation;
-    solvers: relpose_5pt;
+    geometry: pose rotations pinhole brown_conrady kannala_brandt any_camera residuals two_view_triangulation many_view_triangulation homography fundamental;
+    solvers: relpose_7pt relpose_8pt homography relpose_5pt;
 };

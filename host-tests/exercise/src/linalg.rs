@@ -78,4 +78,10 @@ pub(crate) fn polynomials<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
     let roots = linalg::poly::projective_roots_10(&source.array::<T, 11>());
     sink.count(roots.len());
     sink.numbers(roots.iter().flatten());
+    let roots = linalg::cubic_roots(&source.array::<T, 4>());
+    sink.count(roots.len());
+    sink.finite(roots.iter());
+    let roots = linalg::quadratic_roots(&source.array::<T, 3>());
+    sink.count(roots.len());
+    sink.finite(roots.iter());
 }

@@ -64,7 +64,8 @@ impl<T: Real> Homography<T> {
         (is_finite(point.x) && is_finite(point.y)).then_some(point)
     }
 
-    /// The homography from view 2 to view 1. `None` where H is singular to within the rounding of its determinant.
+    /// The homography from view 2 to view 1. `None` where H is singular to within the rounding of its determinant, or
+    /// determinant or inverse leave the range of `T`.
     #[must_use]
     pub fn inverse(&self) -> Option<Self> {
         let [a, b, c] = self.0.data.0.map(Vector3::from);
@@ -76,7 +77,8 @@ impl<T: Real> Homography<T> {
         if !(abs(determinant) > lit::<T>(8.0) * T::EPSILON * size && size <= T::MAX) {
             return None;
         }
-        Some(Self(Matrix3::from_columns(&[bc, ca, ab]).transpose() / determinant))
+        let inverse = Matrix3::from_columns(&[bc, ca, ab]).transpose() / determinant;
+        is_finite(inverse.norm_squared()).then_some(Self(inverse))
     }
 
     /// The up to four motions and planes `H ~ R + t n'` of a homography between normalised points.

@@ -10,8 +10,8 @@ const MAX_STEPS: usize = 40;
 ///
 /// # Returns
 /// No root, one (of a linear equation, or a double one) or two, the larger in magnitude first. A pair that rounding may
-/// have lifted off the axis is one double root. Nothing where a coefficient is not finite or both `c[1]` and `c[2]` are
-/// zero.
+/// have lifted off the axis is one double root. Nothing where a coefficient is not finite or its square
+/// overflows, or both `c[1]` and `c[2]` are zero.
 ///
 /// # Accuracy
 /// Each simple root to a few `EPSILON`, without cancellation.
@@ -30,8 +30,8 @@ pub fn quadratic_roots<T: Real>(c: &[T; 3]) -> Solutions<T, 2> {
     let half = -linear * T::HALF;
     let discriminant = half * half - constant * square;
     let rounding = lit::<T>(4.0) * T::EPSILON * (half * half + abs(constant * square));
-    // Written so that NaN fails too.
-    if !(discriminant >= -rounding) {
+    // Written so that NaN and overflow fail too.
+    if !(discriminant >= -rounding && discriminant <= T::MAX) {
         return roots;
     }
     let root = if discriminant > rounding { sqrt(discriminant) } else { T::ZERO };
@@ -57,7 +57,7 @@ pub fn quadratic_roots<T: Real>(c: &[T; 3]) -> Solutions<T, 2> {
 ///
 /// # Returns
 /// One root or three (two where two of them coincide to within rounding); the one farthest from the inflection first. Nothing
-/// where a coefficient is not finite or `c[3]` is zero.
+/// where a coefficient is not finite, `c[3]` is zero or their quotients overflow.
 ///
 /// # Accuracy
 /// The residual of each root is a few `EPSILON` times the sum of the sizes of the cubic's terms there.
@@ -120,6 +120,9 @@ pub fn cubic_roots<T: Real>(c: &[T; 4]) -> Solutions<T, 3> {
         if abs(step) <= T::TWO * T::EPSILON * abs(x) {
             break;
         }
+    }
+    if !is_finite(x) {
+        return roots;
     }
     roots.push(x);
 

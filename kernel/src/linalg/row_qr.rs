@@ -101,7 +101,7 @@ impl<T: Real, const N: usize> RowQr<T, N> {
     /// where the matrix is nearly rank deficient.
     ///
     /// # Returns
-    /// `None` where `r` is zero or not finite. Compare `value` and `next_value` to judge the rank.
+    /// `None` where `r` is zero, not finite, or so large that its squares are not. Compare `value` and `next_value` to judge the rank.
     ///
     /// # Cost
     /// At most 16 iterations, and one for `next_value`; two triangular solves each.
@@ -162,7 +162,8 @@ impl<T: Real, const N: usize> RowQr<T, N> {
         y = unit(&without(&y, &x))?;
         y = unit(&without(&solver.solve_transposed(&y), &left))?;
         y = unit(&without(&solver.solve(&y), &x))?;
-        Some(LeastSingular { vector: x, value: self.stretch(&x), next_value: self.stretch(&y) })
+        let (value, next_value) = (self.stretch(&x), self.stretch(&y));
+        (is_finite(value) && is_finite(next_value)).then_some(LeastSingular { vector: x, value, next_value })
     }
 
     /// `R^-T x`, where the reciprocals of the pivots stand on the diagonal of `r`.

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::Real;
 use crate::geometry::Homography;
-use crate::real::abs;
+use crate::real::{abs, is_finite};
 
 /// The homography of four correspondences in general position: `x2 = lambda H x1`, lambda > 0.
 ///
@@ -69,11 +69,13 @@ pub fn homography_4pt<T: Real>(x1: &[Vector3<T>; 4], x2: &[Vector3<T>; 4]) -> Op
     let row = a.n * w0 + a.r1 * (w1 - w0) + a.r2 * (w2 - w0);
     let (e1, e2) = (b.d1 * w1, b.d2 * w2);
     let column = |row: T, r1: T, r2: T| x2[0] * row + e1 * r1 + e2 * r2;
-    Some(Homography(Matrix3::from_columns(&[
+    let h = Matrix3::from_columns(&[
         column(row.x, a.r1.x, a.r2.x),
         column(row.y, a.r1.y, a.r2.y),
         column(row.z, a.r1.z, a.r2.z),
-    ])))
+    ]);
+    // Coordinates near the ends of the range of T overflow somewhere above.
+    is_finite(h.norm_squared()).then_some(Homography(h))
 }
 
 /// Point 0 and the differences to points 1 and 2 as a basis, and its adjugate: differences keep the digits of points

@@ -94,7 +94,10 @@ pub fn relpose_7pt<T: Real>(x1: &[Vector3<T>; 7], x2: &[Vector3<T>; 7]) -> Solut
     let (a, b) = (t2 * a * t1, t2 * b * t1);
     for &x in &cubic_roots(&c) {
         let f = a * x + b;
-        solutions.push(Fundamental(f / sqrt(f.norm_squared())));
+        let norm = sqrt(f.norm_squared());
+        if norm > T::ZERO && norm <= T::MAX {
+            solutions.push(Fundamental(f / norm));
+        }
     }
     solutions
 }
