@@ -147,3 +147,51 @@ fn normalise(window: &Window, weights: &Window) -> Option<(Window, f32)> {
     out.iter_mut().flatten().for_each(|x| *x = (*x - mean) / deviation);
     Some((out, deviation))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::fractal;
+    use crate::pyramid::pyramid;
+    use image::{GrayImage, Luma};
+
+    /// A smooth texture of which `motion` takes a point of the first image to the second.
+    fn image(motion: impl Fn(f32, f32) -> (f32, f32), gain: f32) -> Level {
+        let value = |x: u32, y: u32| {
+            let (u, v) = motion(x as f32, y as f32);
+            40.0 + gain * 200.0 * fractal(u / 6.0, v / 6.0, 3, 1)
+        };
+        let image = GrayImage::from_fn(64, 64, |x, y| Luma([value(x, y) as u8]));
+        pyramid(&image, 1, 1.2, 16).remove(0)
+    }
+
+    #[test]
+    fn recovers_shift_turn_and_brightness() {
+        let from = image(|x, y| (x, y), 1.0);
+        let (centre, angle) = (Vector2::new(31.0, 33.0), 0.3f32);
+        let truth = Vector2::new(32.4, 31.7);
+        let (sin, cos) = angle.sin_cos();
+        let to = image(
+            |x, y| {
+                let (dx, dy) = (x - truth.x, y - truth.y);
+                (centre.x + cos * dx + sin * dy, centre.y - sin * dx + cos * dy)
+            },
+            0.8,
+        );
+        // The keypoint is a pixel off and its angle 6 degrees.
+        let start = Patch { centre, angle: 0.0 };
+        let guess = Patch { centre: truth + Vector2::new(0.8, -0.6), angle: angle + 0.1 };
+        let found = align(&from, start, &to, guess).unwrap();
+        assert!((found - truth).norm() < 0.05, "{found}");
+    }
+
+    #[test]
+    fn refuses_another_patch_and_a_flat_one() {
+        let from = image(|x, y| (x, y), 1.0);
+        let other = image(|x, y| (x + 300.0, y + 100.0), 1.0);
+        let flat = image(|_, _| (0.0, 0.0), 1.0);
+        let patch = Patch { centre: Vector2::new(31.0, 33.0), angle: 0.0 };
+        assert_eq!(align(&from, patch, &other, patch), None);
+        assert_eq!(align(&from, patch, &flat, patch), None);
+    }
+}

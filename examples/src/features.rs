@@ -238,3 +238,50 @@ fn describe(smooth: &GrayImage, x: f32, y: f32, angle: f32, tests: &[[f32; 4]]) 
     }
     words
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::matching::cross_check;
+    use crate::noise::fractal;
+    use image::imageops::rotate90;
+    use image::{GrayImage, Luma};
+
+    fn texture() -> GrayImage {
+        let value = |x: u32, y: u32| (255.0 * fractal(x as f32 / 9.0, y as f32 / 9.0, 4, 3)) as u8;
+        GrayImage::from_fn(240, 200, |x, y| Luma([value(x, y)]))
+    }
+
+    #[test]
+    fn a_turned_image_has_the_same_features() {
+        let image = texture();
+        let options = FeatureOptions { max_features: 400, ..Default::default() };
+        let (a, b) = (detect(&image, &options), detect(&rotate90(&image), &options));
+        let matches = cross_check(&a.descriptors, &b.descriptors);
+        // The turn takes (x, y) to (height - 1 - y, x).
+        let right = matches.iter().filter(|(i, j, _)| {
+            let (p, q) = (a.keypoints[*i], b.keypoints[*j]);
+            (q.x - (199.0 - p.y)).hypot(q.y - p.x) < 1.5
+        });
+        let (right, all) = (right.count(), matches.len());
+        assert!(all > 200 && right * 10 > all * 8, "{right} of {all}");
+    }
+
+    #[test]
+    fn features_are_spread_and_no_more_than_asked() {
+        let image = texture();
+        let found = detect(&image, &FeatureOptions { max_features: 120, ..Default::default() });
+        assert!(found.keypoints.len() <= 124 && found.keypoints.len() == found.descriptors.len());
+        for (left, top) in [(true, true), (true, false), (false, true), (false, false)] {
+            let quarter = found.keypoints.iter().filter(|k| (k.x < 120.0) == left && (k.y < 100.0) == top);
+            assert!(quarter.count() >= 15);
+        }
+    }
+
+    #[test]
+    fn nothing_in_a_flat_or_tiny_image() {
+        for image in [GrayImage::new(200, 100), GrayImage::new(3, 2), GrayImage::new(0, 0)] {
+            assert!(detect(&image, &FeatureOptions::default()).keypoints.is_empty());
+        }
+    }
+}

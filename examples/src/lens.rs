@@ -127,3 +127,32 @@ pub fn numbers(text: &str) -> Result<Vec<f64>, String> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> CameraParameters {
+        text.parse().unwrap()
+    }
+
+    #[test]
+    fn strings_come_back() {
+        for text in ["500,501,320,240", "500,501,320,240,-0.3,0.1,0.001,-0.002,0.01"] {
+            assert_eq!(parse(text).to_string(), text);
+        }
+        assert_eq!(parse(" 500, 501 ,320,240,1,2,3,4"), parse("500,501,320,240,1,2,3,4,0"));
+    }
+
+    #[test]
+    fn models_of_colmap() {
+        let name = |c: CameraParameters| (c.colmap().0, c.colmap().1.len());
+        assert_eq!(name(parse("500,500,320,240")), ("PINHOLE", 4));
+        assert_eq!(name(parse("500,500,320,240,1,2,3,4")), ("OPENCV", 8));
+        assert_eq!(name(parse("500,500,320,240,1,2,3,4,5")), ("FULL_OPENCV", 12));
+        let fisheye = FisheyeCoefficients([0.1, 0.2, 0.3, 0.4]);
+        let camera = parse("500,500,320,240").with_fisheye(fisheye).unwrap();
+        assert_eq!(camera.colmap(), ("OPENCV_FISHEYE", vec![500.0, 500.0, 320.5, 240.5, 0.1, 0.2, 0.3, 0.4]));
+        assert!(camera.with_fisheye(fisheye).is_none());
+    }
+}

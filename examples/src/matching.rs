@@ -69,3 +69,24 @@ fn nearest(a: &[Descriptor], b: &[Descriptor]) -> Vec<(usize, u32)> {
 fn hamming(a: &Descriptor, b: &Descriptor) -> u32 {
     a.iter().zip(b).map(|(x, y)| (x ^ y).count_ones()).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bits(n: u64) -> Descriptor {
+        let mut d = Descriptor::default();
+        d[0] = n;
+        d
+    }
+
+    #[test]
+    fn only_mutual_neighbours_match() {
+        let a = [bits(0b1111), bits(0b0000), bits(0b1110)];
+        let b = [bits(0b0001), bits(0b1111)];
+        // a[2] is nearest to b[1], which prefers a[0].
+        assert_eq!(cross_check(&a, &b), [(0, 1, 0), (1, 0, 1)]);
+        assert_eq!(cross_check(&a, &[]), []);
+        assert_eq!(cross_check(&[], &b), []);
+    }
+}

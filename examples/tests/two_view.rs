@@ -110,6 +110,12 @@ fn built_in_scene_in_both_scalars_with_every_output() {
     assert_accurate(&single);
     assert_eq!(single["matches"], result["matches"]);
     assert!(views.join("b.jpg").exists());
+
+    // A lens without distortion is a pinhole, whatever its model is called.
+    let lens = format!("{},0,0,0,0", arguments[3]);
+    arguments[3] = &lens;
+    assert_success(&two_view(&views, &arguments));
+    assert_accurate(&json(&views.join("b.json")));
 }
 
 /// Two cameras, two images, and points whose tracks name existing observations.

@@ -37,7 +37,9 @@ pub(crate) fn write_svg(
         .configure_mesh()
         .x_desc(axis)
         .y_desc("files with a smaller error (%)")
-        .light_line_style(BLACK.mix(0.08))
+        .max_light_lines(1)
+        .x_label_formatter(&f64::to_string)
+        .y_label_formatter(&f64::to_string)
         .draw()?;
     let named = curves.iter().map(|(name, errors)| (name.as_str(), errors));
     for (index, (name, errors)) in named.chain([("all files", &all)]).enumerate() {
