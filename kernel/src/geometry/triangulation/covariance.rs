@@ -91,11 +91,8 @@ impl<T: Real> ViewPair<T> {
             // In units of the point's size, so that squares stay in range.
             let ray = (point - centre) / size;
             let distance = sqrt(ray.norm_squared());
-            let basis = tangent_basis(&(ray / distance)) / distance;
-            qr.fold([0, 1].map(|k| {
-                let b = basis.column(k);
-                [b.x, b.y, b.z]
-            }));
+            let b = tangent_basis(&(ray / distance)) / distance;
+            qr.fold([[b.m11, b.m21, b.m31], [b.m12, b.m22, b.m32]]);
         }
         let covariance = from_factor(qr.r(), sigma_rad)? * size * size;
         covariance.iter().all(|v| is_finite(*v)).then_some(covariance)

@@ -178,11 +178,11 @@ pub fn triangulate_dlt<T: Real>(
         let Some((d, c)) = ray(pose, bearing) else {
             return Ok(Triangulation::Undetermined);
         };
-        let basis = tangent_basis(&d);
-        qr.fold([0, 1].map(|k| {
-            let b = basis.column(k);
-            [b.x, b.y, b.z, -b.dot(&c)]
-        }));
+        let b = tangent_basis(&d);
+        qr.fold(
+            [[b.m11, b.m21, b.m31], [b.m12, b.m22, b.m32]]
+                .map(|[x, y, z]| [x, y, z, -(x * c.x + y * c.y + z * c.z)]),
+        );
     }
     let rounding = parallel_sine::<T>() * sqrt(views);
     let Some(least) = qr.least_singular().filter(|least| least.next_value > rounding) else {
