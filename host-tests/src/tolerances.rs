@@ -59,4 +59,8 @@ table! {
     DLT_ORIGIN: 1e-3, 1e-3,
         "relative distance of points; the DLT weighs a point by its distance from the origin, so views exchanged at a \
          noise of 0.5 px are not quite alike";
+    FACTORISATION: 3e-6, 6e-15,
+        "relative to the matrix; a product of a few rotations or eliminations, a few EPSILON each";
+    ROOT: 5e-5, 1e-13,
+        "relative to the roots' size, roots half of it apart: EPSILON in the coefficients over the slope";
 }

@@ -67,7 +67,8 @@ pub fn quadratic_roots<T: Real>(c: &[T; 3]) -> Solutions<T, 2> {
 ///
 /// # References
 /// R. W. D. Nickalls, "A new approach to solving the cubic: Cardan's solution revealed", The Mathematical Gazette, 1993
-/// (where the outer roots lie). Newton's method replaces the trigonometric and cube-root formulas.
+/// (where the outer roots lie); W. Kahan, "To Solve a Real Cubic Equation", University of California, Berkeley, 1986
+/// (deflation). Newton's method replaces the trigonometric and cube-root formulas.
 ///
 /// # Examples
 /// ```
@@ -126,8 +127,15 @@ pub fn cubic_roots<T: Real>(c: &[T; 4]) -> Solutions<T, 3> {
     }
     roots.push(x);
 
-    let sum = p2 + x;
-    let rest = quadratic_roots(&[sum * x + p1, sum, T::ONE]);
+    // Division of the cubic by x - root: from the constant term where the root is large beside the others, which would
+    // else drown in its rounding (Kahan).
+    let (linear, constant) = if abs(x * x * x) > abs(p0) {
+        let constant = -p0 / x;
+        ((constant - p1) / x, constant)
+    } else {
+        (p2 + x, (p2 + x) * x + p1)
+    };
+    let rest = quadratic_roots(&[constant, linear, T::ONE]);
     let gap = if let [a, b] = *rest.as_slice() { abs(a - b) } else { T::ZERO };
     for &root in &rest {
         // The deflated quadratic has the first root's error: one step on the cubic takes it out of a simple root.

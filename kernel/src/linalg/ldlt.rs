@@ -31,6 +31,8 @@ impl<T: Real, const N: usize> Ldlt<T, N> {
     /// working precision (a pivot is not larger than `N EPSILON` times its diagonal element) or holds a NaN or an
     /// infinity.
     ///
+    /// A singular matrix may pass where its leading blocks are ill-conditioned: rounding then leaves a larger pivot.
+    ///
     /// # Accuracy
     /// Backward stable.
     ///

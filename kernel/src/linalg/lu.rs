@@ -32,6 +32,8 @@ impl<T: Real, const N: usize> Lu<T, N> {
     /// The factors of `a`; `None` where `a` is singular to working precision (a pivot is not larger than
     /// `N EPSILON` times the largest element) or holds a NaN or an infinity.
     ///
+    /// A singular matrix may pass where its leading blocks are ill-conditioned: rounding then leaves a larger pivot.
+    ///
     /// # Accuracy
     /// Backward stable in practice: the relative residual of a solution is a few `EPSILON`.
     ///
