@@ -47,7 +47,8 @@ pub struct SymmetricEigen<T: Real, const N: usize> {
 pub fn symmetric_eigen<T: Real, const N: usize>(a: &SMatrix<T, N, N>) -> Option<SymmetricEigen<T, N>> {
     // Column-major storage: m[q][p] with p < q is the upper triangle.
     let mut m = a.data.0;
-    let largest = super::largest_magnitude(m.iter().flatten())?;
+    let largest =
+        super::largest_magnitude(m.iter().enumerate().flat_map(|(q, column)| column.iter().take(q + 1)))?;
     let mut v = super::identity::<T, N>().data.0;
     if largest > T::ZERO {
         m.iter_mut().flatten().for_each(|x| *x /= largest);

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::eigen::jacobi_angle;
 use crate::Real;
-use crate::real::{abs, lit, sqrt};
+use crate::real::{abs, lit, min, sqrt};
 
 /// Sweeps of Jacobi rotations at the most. Convergence is quadratic: 3 to 6 are usual.
 const MAX_SWEEPS: usize = 15;
@@ -100,7 +100,8 @@ pub fn svd3<T: Real>(a: &Matrix3<T>) -> Option<Svd3<T>> {
     let u2 = if s2 < -T::EPSILON * s0 { -u2 } else { u2 };
     Some(Svd3 {
         u: Matrix3::from_columns(&[u0, u1, u2]),
-        s: Vector3::new(s0, s1, abs(s2)) * largest,
+        // Equal values stay in order whatever their rounding.
+        s: Vector3::new(s0, min(s1, s0), min(abs(s2), min(s1, s0))) * largest,
         v: Matrix3::from_columns(&[v0, v1, v2]),
     })
 }
