@@ -1,5 +1,7 @@
 //! Windows for tests and measurements: memory by run-time capacities, problems from files, synthetic flights.
 
+pub mod flight;
+pub mod odometer;
 pub mod problem;
 
 use epipole::Real;

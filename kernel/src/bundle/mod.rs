@@ -7,7 +7,6 @@ pub use memory::{
     WindowStorage, prior_len, scalars_len, system_len,
 };
 pub use options::{BundleOptions, BundleReport, PointReport, Progress, Termination, Unknowns};
-pub use prior::Marginalised;
 pub use window::Window;
 
 mod constraint;

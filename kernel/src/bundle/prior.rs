@@ -1,30 +1,50 @@
 //! Marginalisation: what a frame and its points said of the frames that remain, as a square root of information.
 
 use super::constraint::{self, At};
-use super::memory::{FrameHandle, NO_SLOT, ObservationSlot};
+use super::memory::{FrameHandle, FrameSlot, NO_SLOT, ObservationSlot, PointHandle};
 use super::pass::Groups;
 use super::square_root::SquareRoot;
 use super::{Window, WindowError};
 use crate::Real;
 use crate::robust::loss::Loss;
 
-/// What a marginalisation did.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Marginalised {
-    /// Points that went into the prior with all their observations, and out of the window.
-    pub points: usize,
-    /// Frames that the prior now ties together.
-    pub prior_frames: usize,
+/// What goes into the prior.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Leaving {
+    /// A frame: its observations, its prior and its distances, then its pose is eliminated.
+    Frame(u16),
+    /// A point: all its observations.
+    Point(u16),
+    /// A frame without what it observed: it is eliminated from the prior that is there.
+    FrameAlone(u16),
+}
+
+impl Leaving {
+    fn takes<T: Real>(self, o: &ObservationSlot<T>) -> bool {
+        match self {
+            Self::Frame(frame) => o.frame == frame,
+            Self::Point(point) => o.point == point,
+            Self::FrameAlone(_) => false,
+        }
+    }
+
+    fn frame(self) -> Option<u16> {
+        match self {
+            Self::Frame(frame) | Self::FrameAlone(frame) => Some(frame),
+            Self::Point(_) => None,
+        }
+    }
 }
 
 impl<T: Real> Window<'_, T> {
     /// Takes a frame out of the window and leaves what it said about the other frames as a prior on them.
     ///
-    /// Every point that the frame observes goes with it: all its observations, in whichever frame, enter the prior once,
-    /// and the point's handle becomes stale. A point that is still tracked is added anew by the caller with the
-    /// observations of the frames to come, at the position read before. Measured on a synthetic flight this keeps
-    /// more of the information than dropping the frame's observations of points that live on.
+    /// The frame's observations enter the prior as what they add to the observations of the same points that stay:
+    /// their prediction from those is compared with them, and the point is eliminated from the comparison. So the
+    /// points live on with the rest of their observations, none counts twice, and of a point that no further frame
+    /// observes, frame by frame exactly the whole goes into the prior (the chain rule of probability). A point that is
+    /// observed again later is counted as a little less certain than it is. A point left without observations goes too,
+    /// and its handle becomes stale.
     ///
     /// # Input
     /// Call it where the window is optimised: the prior is linearised where frames and points are. A frame that is
@@ -32,43 +52,64 @@ impl<T: Real> Window<'_, T> {
     /// direction that the measurements do not determine is ever believed to be known. `loss` gives each observation the
     /// weight with which it enters.
     ///
+    /// # Returns
+    /// The number of points that went.
+    ///
     /// # Errors
     /// [`WindowError::StaleFrame`], [`WindowError::NoPriorMemory`].
     ///
     /// # Degeneracies
-    /// A frame or direction that nothing determines leaves rows of zeros. Points behind their camera count for nothing.
+    /// A frame or direction that nothing determines leaves rows of zeros. Observations behind their camera count for
+    /// nothing.
     ///
     /// # Accuracy
     /// The factor is triangularised by Givens rotations, never through its square: in `f32` the prior keeps directions
     /// that are 1e6 times weaker than the strongest, where a Hessian keeps 1e3.
     ///
     /// # Cost
-    /// Two rows of up to `6 n` unknowns for every observation of the points that go, `O(n^2)` each.
+    /// Two rows of up to `6 n` unknowns for every observation of the frame, `O(n^2)` each.
     ///
     /// # References
     /// M. Kaess, A. Ranganathan, F. Dellaert, "iSAM: incremental smoothing and mapping", IEEE Transactions on Robotics
     /// 24(6), 2008 (rows by Givens rotations). N. Demmel, D. Schubert, C. Sommer, D. Cremers, V. Usenko, "Square root
     /// marginalization for sliding-window bundle adjustment", ICCV 2021. G. Huang, A. Mourikis, S. Roumeliotis,
     /// "Observability-based rules for designing consistent EKF SLAM estimators", IJRR 29(5), 2010 (first estimates).
-    pub fn marginalise_frame(
-        &mut self,
-        frame: FrameHandle,
-        loss: &Loss<T>,
-    ) -> Result<Marginalised, WindowError> {
+    /// Deviation: those drop the frame's observations of points that live on, or end the points; on a synthetic flight
+    /// with 8 frames that leaves 2.8 times the position error of full bundle adjustment, this 1.15 times.
+    pub fn marginalise_frame(&mut self, frame: FrameHandle, loss: &Loss<T>) -> Result<usize, WindowError> {
         self.frame(frame)?;
         if !self.has_prior_memory() {
             return Err(WindowError::NoPriorMemory);
         }
-        let index = frame.index;
-        let points = fold(self, index, Some(loss)).ok_or(WindowError::NoPriorMemory)?;
-        for point in 0..self.points.len() as u16 {
-            if observed_by(self.group(point), index) {
+        fold(self, Leaving::Frame(frame.index), loss).ok_or(WindowError::NoPriorMemory)?;
+        let mut gone = 0;
+        for point in (0u16..).take(self.points.len()) {
+            if let [only] = self.group(point)
+                && only.frame == frame.index
+            {
                 self.erase_point(point);
-                self.retain_observations(|o| o.point != point);
+                gone += 1;
             }
         }
-        self.erase_frame(index);
-        Ok(Marginalised { points, prior_frames: self.header.prior_frames })
+        self.erase_frame(frame.index);
+        Ok(gone)
+    }
+
+    /// Takes a point out of the window and leaves what its observations said about the frames as a prior on them:
+    /// exact, and a way to make room for other points.
+    ///
+    /// # Errors
+    /// [`WindowError::StalePoint`], [`WindowError::NoPriorMemory`].
+    ///
+    /// # Cost
+    /// Two rows of up to `6 n` unknowns for each of its observations, `O(n^2)` each.
+    pub fn marginalise_point(&mut self, point: PointHandle, loss: &Loss<T>) -> Result<(), WindowError> {
+        self.point(point)?;
+        if !self.has_prior_memory() {
+            return Err(WindowError::NoPriorMemory);
+        }
+        fold(self, Leaving::Point(point.index), loss).ok_or(WindowError::NoPriorMemory)?;
+        self.remove_point(point)
     }
 
     /// Frames in the marginalisation prior.
@@ -86,98 +127,91 @@ impl<T: Real> Window<'_, T> {
     }
 }
 
-fn observed_by<T: Real>(group: &[ObservationSlot<T>], frame: u16) -> bool {
-    group.iter().any(|o| o.frame == frame)
-}
-
 /// Takes a removed frame out of the prior.
 pub(super) fn project_out<T: Real>(window: &mut Window<'_, T>, frame: u16) {
     if window.frames.get(frame as usize).is_some_and(|f| f.prior_column != NO_SLOT) {
-        let _ = fold(window, frame, None);
+        let _ = fold(window, Leaving::FrameAlone(frame), &Loss::Squared);
     }
 }
 
-/// Rebuilds the prior without `frame`; with `loss`, what its points, its own prior and its distances say goes in.
-/// Returns how many points went in.
-fn fold<T: Real>(window: &mut Window<'_, T>, frame: u16, loss: Option<&Loss<T>>) -> Option<usize> {
-    let live = window.observations.split_at_checked(window.header.observations)?.0;
-    // Columns: the frame itself first, then every other that the prior or a point of the frame ties to it.
-    let tied = |frames: &mut [super::FrameSlot<T>], i: u16| {
+/// Gives a column to every frame that the prior will tie together, the leaving frame's first.
+fn assign_columns<T: Real>(
+    frames: &mut [FrameSlot<T>],
+    observations: &[ObservationSlot<T>],
+    leaving: Leaving,
+) -> u16 {
+    let tie = |frames: &mut [FrameSlot<T>], i: u16| {
         if let Some(f) = frames.get_mut(i as usize)
             && (!f.fixed || f.prior_column != NO_SLOT)
         {
             f.slot = 0;
         }
     };
-    for f in window.frames.iter_mut() {
-        f.slot = if f.prior_column == NO_SLOT { NO_SLOT } else { 0 };
-    }
-    tied(window.frames, frame);
-    if loss.is_some() {
-        for (_, group) in Groups(live).filter(|(_, g)| observed_by(g, frame)) {
-            for o in group {
-                tied(window.frames, o.frame);
-            }
-        }
-        for i in 0..window.frames.len() as u16 {
-            let Some(other) = window.frames.get(i as usize).and_then(|f| f.distance).map(|d| d.other) else {
-                continue;
-            };
-            if i == frame {
-                tied(window.frames, other);
-            } else if other == frame {
-                tied(window.frames, i);
-            }
-        }
-    }
-    let own = window.frames.get(frame as usize).is_some_and(|f| f.slot != NO_SLOT);
-    let mut used = u16::from(own);
-    for (i, f) in (0u16..).zip(window.frames.iter_mut()) {
-        if f.slot == NO_SLOT {
-            continue;
-        }
+    for f in frames.iter_mut() {
+        f.slot = 0;
         if f.prior_column == NO_SLOT {
+            f.slot = NO_SLOT;
             f.first = f.pose;
         }
-        if i == frame {
-            f.slot = 0;
-        } else {
+    }
+    for (_, group) in Groups(observations).filter(|(_, g)| g.iter().any(|o| leaving.takes(o))) {
+        for o in group {
+            tie(frames, o.frame);
+        }
+    }
+    if let Leaving::Frame(frame) = leaving {
+        tie(frames, frame);
+        for i in (0u16..).take(frames.len()) {
+            let other = frames.get(i as usize).and_then(|f| f.distance).map(|d| d.other);
+            match other {
+                Some(other) if i == frame => tie(frames, other),
+                Some(other) if other == frame => tie(frames, i),
+                _ => {}
+            }
+        }
+    }
+    let own = |i: u16| leaving.frame() == Some(i);
+    let mut used = u16::from((0u16..).zip(frames.iter()).any(|(i, f)| own(i) && f.slot != NO_SLOT));
+    for (i, f) in (0u16..).zip(frames.iter_mut()).filter(|(_, f)| f.slot != NO_SLOT) {
+        if !own(i) {
             f.slot = used;
             used += 1;
         }
     }
-    let capacity = window.frames.len();
-    let mut root = SquareRoot::of(window.scalars, capacity, used as usize)?;
+    used
+}
+
+/// Folds what leaves into the prior.
+fn fold<T: Real>(window: &mut Window<'_, T>, leaving: Leaving, loss: &Loss<T>) -> Option<()> {
+    let observations = window.observations.split_at_checked(window.header.observations)?.0;
+    let used = assign_columns(window.frames, observations, leaving);
+    let mut root = SquareRoot::of(window.scalars, window.frames.len(), used as usize)?;
     let row = core::mem::take(&mut root.constraint);
     let prior = core::mem::take(&mut root.prior);
-    let only = if loss.is_some() { frame } else { NO_SLOT };
+    let only = if let Leaving::Frame(frame) = leaving { frame } else { NO_SLOT };
     let prior_frames = window.header.prior_frames;
     constraint::rows(window.frames, prior, prior_frames, row, At::First, Some(only), |j, r| {
         root.insert_row(j, r);
     });
-    let mut points = 0;
-    if let Some(loss) = loss {
-        for (i, group) in Groups(live).filter(|(_, g)| observed_by(g, frame)) {
-            if let Some(point) = window.points.get(i) {
-                root.insert_point(window.frames, point, group, loss, At::First);
-                points += 1;
-            }
+    for (i, group) in Groups(observations).filter(|(_, g)| g.iter().any(|o| leaving.takes(o))) {
+        if let Some(point) = window.points.get(i) {
+            root.insert_point(window.frames, point, group, loss, At::First, |o| leaving.takes(o));
         }
     }
     // Leaving the frame's six rows aside marginalises it; what follows is the packed factor of the rest.
+    let frame = leaving.frame().and_then(|i| window.frames.get_mut(i as usize)).filter(|f| f.slot != NO_SLOT);
+    let own = u16::from(frame.is_some());
+    if let Some(frame) = frame {
+        frame.slot = NO_SLOT;
+    }
     let n = root.n;
-    let skipped = if own { 6 } else { 0 };
-    let start: usize = (0..skipped).map(|k| n - k + 1).sum();
+    let start: usize = (0..6 * own as usize).map(|k| n - k + 1).sum();
     for (to, &from) in prior.iter_mut().zip(root.factor.iter().skip(start)) {
         *to = from;
     }
-    window.header.prior_frames = used.saturating_sub(u16::from(own)) as usize;
-    for (i, f) in (0u16..).zip(window.frames.iter_mut()) {
-        f.prior_column = match f.slot {
-            NO_SLOT => NO_SLOT,
-            _ if i == frame => NO_SLOT,
-            slot => slot - u16::from(own),
-        };
+    window.header.prior_frames = used.saturating_sub(own) as usize;
+    for f in window.frames.iter_mut() {
+        f.prior_column = if f.slot == NO_SLOT { NO_SLOT } else { f.slot.saturating_sub(own) };
     }
-    Some(points)
+    Some(())
 }

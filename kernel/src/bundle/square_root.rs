@@ -50,7 +50,7 @@ impl<'a, T: Real> SquareRoot<'a, T> {
         insert(self.factor, self.n, row, scale);
     }
 
-    /// Folds in the observations of a point. Afterwards `lead` holds the rows that determine the point itself: leaving
+    /// Folds in those observations of a point that enter, given those that stay. Afterwards `lead` holds the rows that determine the point itself: leaving
     /// them aside marginalises it.
     pub(super) fn insert_point(
         &mut self,
@@ -59,11 +59,15 @@ impl<'a, T: Real> SquareRoot<'a, T> {
         group: &[ObservationSlot<T>],
         loss: &Loss<T>,
         at: At,
+        enters: impl Fn(&ObservationSlot<T>) -> bool,
     ) {
         for lead in &mut self.lead {
             lead.fill(T::ZERO);
         }
-        for o in group {
+        // Those that stay come first: what they say of the point is what the others are compared with.
+        let (staying, entering) = (group.iter().filter(|o| !enters(o)), group.iter().filter(|o| enters(o)));
+        for o in staying.chain(entering) {
+            let enters = enters(o);
             let Some(frame) = frames.get(o.frame as usize) else { continue };
             let Some(camera) = &frame.camera else { continue };
             let place = if frame.slot == NO_SLOT { &frame.pose } else { frame.at(at) };
@@ -99,12 +103,12 @@ impl<'a, T: Real> SquareRoot<'a, T> {
                     *block = j;
                 }
                 let jacobian = self.row.split_last().map_or(&[][..], |(_, j)| j);
-                self.fold_row(row_scale(jacobian));
+                self.fold_row(row_scale(jacobian), enters);
             }
         }
     }
 
-    fn fold_row(&mut self, scale: T) {
+    fn fold_row(&mut self, scale: T, enters: bool) {
         let mut row = &mut *self.row;
         for (k, lead) in self.lead.iter_mut().enumerate() {
             let Some((_, lead)) = lead.split_at_mut_checked(k) else { return };
@@ -112,7 +116,9 @@ impl<'a, T: Real> SquareRoot<'a, T> {
             let Some((_, shorter)) = row.split_first_mut() else { return };
             row = shorter;
         }
-        insert(self.factor, self.n, row, scale);
+        if enters {
+            insert(self.factor, self.n, row, scale);
+        }
     }
 
     /// `t` becomes `t R^-1` for a row `t` over the frames. False where an unknown of the frames is not determined.

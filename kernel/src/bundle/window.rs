@@ -84,8 +84,9 @@ impl<'a, T: Real> Window<'a, T> {
             .zip(self.frames.iter_mut())
             .find(|(_, f)| !f.is_live())
             .ok_or(WindowError::FramesFull)?;
-        *slot = FrameSlot { camera: Some(camera), pose, generation: slot.generation, ..FrameSlot::EMPTY };
-        Ok(FrameHandle { index, generation: slot.generation })
+        let generation = slot.generation;
+        *slot = FrameSlot { camera: Some(camera), pose, generation, ..FrameSlot::EMPTY };
+        Ok(FrameHandle { index, generation })
     }
 
     /// Adds a point of the world.

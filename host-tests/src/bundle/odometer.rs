@@ -1,0 +1,185 @@
+//! A sliding window run over a flight, frame after frame.
+
+use std::collections::{HashMap, VecDeque};
+
+use epipole::Real;
+use epipole::bundle::{BundleOptions, FrameHandle, PointHandle, Window};
+use epipole::geometry::{Camera, Pinhole, Pose};
+use epipole::nalgebra::{Vector2, Vector3, Vector6};
+use epipole::real::lit;
+use epipole::robust::loss::Loss;
+
+use super::HeapWindow;
+use super::flight::{CAMERA, Flight, centre};
+use super::problem::cast_pose;
+
+/// What happens to the oldest frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Oldest {
+    /// It is marginalised.
+    Marginalise,
+    /// It is removed, and the next oldest two are fixed where they are.
+    Forget,
+    /// It stays: full bundle adjustment.
+    Keep,
+}
+
+/// A window that follows a flight. The first two frames are given (they fix the gauge and the scale).
+pub struct Odometer<T: Real> {
+    memory: HeapWindow<T>,
+    capacity: usize,
+    oldest: Oldest,
+    options: BundleOptions<T>,
+    frames: VecDeque<(usize, FrameHandle)>,
+    points: HashMap<usize, PointHandle>,
+    waiting: HashMap<usize, Vec<(usize, Vector2<f64>)>>,
+    /// Estimated poses so far, as they were when the frame was new.
+    pub poses: Vec<Pose<f64>>,
+    /// Standard deviation of the distance between neighbouring frames, if it is measured.
+    pub distance_sigma: Option<f64>,
+}
+
+impl<T: Real> Odometer<T> {
+    /// A window of so many frames.
+    pub fn new(capacity: usize, points: usize, oldest: Oldest) -> Self {
+        Self {
+            memory: HeapWindow::new(capacity, points, points * capacity.min(24)),
+            capacity,
+            oldest,
+            options: BundleOptions { loss: Loss::Huber(lit(2.0)), ..BundleOptions::default() },
+            frames: VecDeque::new(),
+            points: HashMap::new(),
+            waiting: HashMap::new(),
+            poses: vec![],
+            distance_sigma: None,
+        }
+    }
+
+    /// The window, and the handle of the newest frame.
+    pub fn window(&mut self) -> (Window<'_, T>, FrameHandle) {
+        let newest = self.frames.back().expect("a frame").1;
+        (self.memory.window(), newest)
+    }
+
+    /// The poses of the frames that are in the window, by number.
+    pub fn window_poses(&mut self) -> Vec<(usize, Pose<f64>)> {
+        let window = self.memory.window();
+        self.frames.iter().map(|(k, f)| (*k, cast_pose(&window.pose(*f).expect("live")))).collect()
+    }
+
+    /// The newest frame's error, squared and normalised by the covariance the window tells: six degrees of freedom.
+    pub fn normalised_error(&mut self, flight: &Flight) -> f64 {
+        let k = self.poses.len() - 1;
+        let (estimate, loss) = (self.poses[k], self.options.loss);
+        let (mut window, newest) = self.window();
+        let covariance = window.frame_covariance(newest, &loss).expect("an observable frame").motion;
+        let truth = &flight.poses[k];
+        // The motion from the estimate to the truth.
+        let turn = (truth.rotation * estimate.rotation.inverse()).scaled_axis();
+        let shift = estimate.rotation * (centre(&estimate) - flight.centre(k));
+        let e = Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z);
+        let information = covariance.map(|x| x.to_f64()).cholesky().expect("positive definite");
+        e.dot(&information.solve(&e))
+    }
+
+    /// Takes the next frame of a flight in.
+    pub fn step(&mut self, flight: &Flight, distance: Option<f64>) {
+        let k = self.poses.len();
+        let mut window = self.memory.window();
+        if self.frames.len() == self.capacity {
+            let (gone, handle) = self.frames.pop_front().expect("a full window");
+            if self.oldest == Oldest::Marginalise {
+                window.marginalise_frame(handle, &self.options.loss).expect("a live frame");
+            } else {
+                window.remove_frame(handle).expect("a live frame");
+                for (_, f) in self.frames.iter().take(2) {
+                    window.fix_frame(*f, true).expect("a live frame");
+                }
+            }
+            self.points.retain(|_, p| window.position(*p).is_ok());
+            for list in self.waiting.values_mut() {
+                list.retain(|(f, _)| *f != gone);
+            }
+        }
+        let c = CAMERA.map(lit::<T>);
+        let camera: Camera<T> = Pinhole::new(c[0], c[1], c[2], c[3]).expect("a camera").into();
+        let start = if k < 2 {
+            flight.poses[k]
+        } else {
+            let [a, b] = [self.frames[self.frames.len() - 2], self.frames[self.frames.len() - 1]]
+                .map(|(_, f)| cast_pose::<T, f64>(&window.pose(f).expect("live")));
+            b * a.inverse() * b
+        };
+        let frame = window.add_frame(camera, &cast_pose(&start)).expect("room for a frame");
+        window.fix_frame(frame, k < 2).expect("live");
+        if let (Some(d), Some((_, last))) = (distance, self.frames.back())
+            && let Some(sigma) = self.distance_sigma
+            && k >= 2
+        {
+            window.set_distance(frame, *last, lit(d), lit(sigma)).expect("two frames");
+        }
+        self.frames.push_back((k, frame));
+        let mut known = 0;
+        for (track, pixel) in &flight.seen[k] {
+            match self.points.get(track) {
+                Some(point) => {
+                    window.add_observation(frame, *point, &pixel.map(lit), T::ONE).expect("room");
+                    known += 1;
+                }
+                None => self.waiting.entry(*track).or_default().push((k, *pixel)),
+            }
+        }
+        if k >= 2 && known >= 6 {
+            let _ = window.refine_frame(frame, &self.options);
+        }
+        // New points of tracks with enough parallax.
+        let handle_of: HashMap<usize, FrameHandle> = self.frames.iter().copied().collect();
+        for (track, _) in &flight.seen[k] {
+            let Some(list) = self.waiting.get(track) else { continue };
+            let (first, last) = (list[0], list[list.len() - 1]);
+            if list.len() < 2 {
+                continue;
+            }
+            let ray = |(f, pixel): (usize, Vector2<f64>)| {
+                let pose: Pose<f64> = cast_pose(&window.pose(handle_of[&f]).expect("live"));
+                let b =
+                    Vector3::new((pixel.x - CAMERA[2]) / CAMERA[0], (pixel.y - CAMERA[3]) / CAMERA[1], 1.0);
+                (centre(&pose), pose.rotation.inverse() * b.normalize())
+            };
+            let Some(x) = midpoint(ray(first), ray(last)) else { continue };
+            let Ok(point) = window.add_point(&x.map(lit)) else { continue };
+            for (f, pixel) in list {
+                window
+                    .add_observation(handle_of[f], point, &pixel.map(lit), T::ONE)
+                    .expect("room for an observation");
+            }
+            let seen = window.point_report(point, lit(5.0)).expect("live");
+            if seen.behind > 0 {
+                window.remove_point(point).expect("live");
+                continue;
+            }
+            self.points.insert(*track, point);
+            self.waiting.remove(track);
+        }
+        if k >= 2 {
+            let _ = window.optimise(&self.options);
+        }
+        self.poses.push(cast_pose(&window.pose(frame).expect("live")));
+        if self.oldest != Oldest::Keep {
+            let now: std::collections::HashSet<usize> = flight.seen[k].iter().map(|s| s.0).collect();
+            self.waiting.retain(|track, _| now.contains(track));
+        }
+    }
+}
+
+/// The point nearest to two rays, in front of both, with at least half a degree between them.
+fn midpoint(a: (Vector3<f64>, Vector3<f64>), b: (Vector3<f64>, Vector3<f64>)) -> Option<Vector3<f64>> {
+    let (d, cos) = (b.0 - a.0, a.1.dot(&b.1));
+    let sin_sq = 1.0 - cos * cos;
+    if sin_sq < 0.5f64.to_radians().powi(2) {
+        return None;
+    }
+    let s = (d.dot(&a.1) - cos * d.dot(&b.1)) / sin_sq;
+    let t = (cos * d.dot(&a.1) - d.dot(&b.1)) / sin_sq;
+    (s > 0.5 && t > 0.5).then(|| (a.0 + a.1 * s + b.0 + b.1 * t) * 0.5)
+}
