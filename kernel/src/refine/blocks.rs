@@ -77,6 +77,10 @@ pub(crate) trait EpipolarBlock<T: Real>: Block<T> {
     /// `r` and its gradient by the entries of `f`, row by row.
     fn gradient(&self, f: &Matrix3<T>) -> (Lanes<T>, [Lanes<T>; 9]);
 
+    /// The points on the plane z = 1, and by how much squared distances there are to be multiplied: 1 on a plane; for
+    /// bearings what makes distances angles, NaN where a bearing does not meet the plane.
+    fn planes(&self) -> (PlaneBlock<T>, Lanes<T>);
+
     /// The homogeneous points or bearings, component by component.
     fn directions(&self) -> ([Lanes<T>; 3], [Lanes<T>; 3]);
 }
@@ -139,6 +143,11 @@ impl<T: Real> EpipolarBlock<T> for PlaneBlock<T> {
             g[8][l] = inverse;
         }
         (r, g)
+    }
+
+    #[inline(always)]
+    fn planes(&self) -> (PlaneBlock<T>, Lanes<T>) {
+        (*self, [T::ONE; LANES])
     }
 
     #[inline(always)]
@@ -208,6 +217,23 @@ impl<T: Real> EpipolarBlock<T> for BearingBlock<T> {
             }
         }
         (r, g)
+    }
+
+    #[inline(always)]
+    fn planes(&self) -> (PlaneBlock<T>, Lanes<T>) {
+        let (mut plane, mut weight) = ([[T::ZERO; LANES]; 4], [T::ONE; LANES]);
+        for l in 0..LANES {
+            let (a, b) = (T::ONE / self[2][l], T::ONE / self[5][l]);
+            plane[0][l] = self[0][l] * a;
+            plane[1][l] = self[1][l] * a;
+            plane[2][l] = self[3][l] * b;
+            plane[3][l] = self[4][l] * b;
+            // A distance on the plane is an angle over cos^2 along the radius: the product of both views' cosines.
+            let cosines = self[2][l] * self[5][l];
+            let ahead = self[2][l] > T::ZERO && self[5][l] > T::ZERO;
+            weight[l] = if ahead { cosines * cosines } else { crate::real::lit(f64::NAN) };
+        }
+        (plane, weight)
     }
 
     #[inline(always)]

@@ -51,6 +51,26 @@ impl<T: Real> Scales<T> {
         result
     }
 
+    /// `D2 H D1^-1`: a homography between normalised coordinates, for those of the blocks.
+    pub(crate) fn transfer(&self, h: &Matrix3<T>) -> Matrix3<T> {
+        let (a, b) = (self.inverse1(), self.view2);
+        let m = &h.data.0;
+        let column = |j: usize, s: T| [m[j][0] * b[0] * s, m[j][1] * b[1] * s, m[j][2] * s];
+        let mut result = *h;
+        result.data.0 = [column(0, a[0]), column(1, a[1]), column(2, T::ONE)];
+        result
+    }
+
+    /// `D2^-1 H D1`: the inverse of [`Scales::transfer`].
+    pub(crate) fn transfer_back(&self, h: &Matrix3<T>) -> Matrix3<T> {
+        let (a, b) = (self.view1, self.inverse2());
+        let m = &h.data.0;
+        let column = |j: usize, s: T| [m[j][0] * b[0] * s, m[j][1] * b[1] * s, m[j][2] * s];
+        let mut result = *h;
+        result.data.0 = [column(0, a[0]), column(1, a[1]), column(2, T::ONE)];
+        result
+    }
+
     /// Normalised coordinates over those of the blocks, view 1.
     #[inline]
     #[must_use]

@@ -7,7 +7,7 @@ use crate::geometry::Essential;
 use crate::linalg::{LANES, Lanes};
 use crate::real::{abs, lit, sqrt};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock};
-use crate::refine::lm::{Manifold, minimise};
+use crate::refine::lm::{Manifold, Minimum, minimise};
 use crate::refine::relative_pose::{PoseModel, Scales};
 use crate::robust::loss::Loss;
 use crate::robust::{Estimator, Gate, Score, ScoreCounts, Tally};
@@ -91,14 +91,14 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         }
     }
 
-    /// The model that minimises the truncated loss at `threshold` times `factor`, from `model`.
+    /// The model that minimises a loss, from `model`.
     pub(super) fn optimise(
         &self,
         model: &PoseModel<T>,
         loss: &Loss<T>,
         passes: u32,
         tolerance: T,
-    ) -> crate::refine::lm::Minimum<PoseModel<T>, T, 5> {
+    ) -> Minimum<PoseModel<T>, T, 5> {
         minimise(self.data, model, loss, passes, tolerance)
     }
 }

@@ -1,0 +1,294 @@
+//! The transfer error `x2 ~ H x1` on blocks, and the models that it refines: homographies and rotations.
+//!
+//! The squared error is Sampson's: `e' (I + J J')^-1 e` with `e` the transfer error in view 2 and `J` the Jacobian of
+//! the transferred point by the point of view 1, so that noise in both views counts.
+
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+
+use super::blocks::{BlockSlice, EpipolarBlock, PlaneBlock};
+use super::lm::{Manifold, NormalEquations};
+use super::relative_pose::{Scales, cayley};
+use crate::Real;
+use crate::linalg::{LANES, Lanes};
+use crate::real::{abs, sqrt};
+use crate::robust::loss::Loss;
+
+/// One transferred point.
+struct Transfer<T> {
+    /// The transferred point.
+    u: T,
+    v: T,
+    /// The error.
+    ex: T,
+    ey: T,
+    /// Inverse of its covariance: xx, xy, yy.
+    w: [T; 3],
+    /// 1 / depth of the transferred point; not positive where it has left the image plane.
+    inverse_z: T,
+}
+
+impl<T: Real> Transfer<T> {
+    #[inline(always)]
+    fn new(h: &Matrix3<T>, x1: T, y1: T, x2: T, y2: T) -> Self {
+        let m = &h.data.0;
+        let inverse_z = T::ONE / (m[0][2] * x1 + m[1][2] * y1 + m[2][2]);
+        let u = (m[0][0] * x1 + m[1][0] * y1 + m[2][0]) * inverse_z;
+        let v = (m[0][1] * x1 + m[1][1] * y1 + m[2][1]) * inverse_z;
+        let (a, b) = ((m[0][0] - u * m[0][2]) * inverse_z, (m[1][0] - u * m[1][2]) * inverse_z);
+        let (c, d) = ((m[0][1] - v * m[0][2]) * inverse_z, (m[1][1] - v * m[1][2]) * inverse_z);
+        let (xx, xy, yy) = (T::ONE + a * a + b * b, a * c + b * d, T::ONE + c * c + d * d);
+        let scale = T::ONE / (xx * yy - xy * xy);
+        Self { u, v, ex: u - x2, ey: v - y2, w: [yy * scale, -xy * scale, xx * scale], inverse_z }
+    }
+
+    #[inline(always)]
+    fn squared(&self) -> T {
+        let (x, y) = (self.ex, self.ey);
+        self.w[0] * x * x + (self.w[1] + self.w[1]) * x * y + self.w[2] * y * y
+    }
+}
+
+/// Squared transfer errors of a block; `T::MAX` where the transferred point is not in front of view 2 or not a number.
+#[inline(always)]
+pub(crate) fn transfer_sq<T: Real>(h: &Matrix3<T>, block: &PlaneBlock<T>, weight: &Lanes<T>) -> Lanes<T> {
+    let mut squared = [T::MAX; LANES];
+    for l in 0..LANES {
+        let t = Transfer::new(h, block[0][l], block[1][l], block[2][l], block[3][l]);
+        let s = t.squared() * weight[l];
+        squared[l] = if t.inverse_z > T::ZERO && s <= T::MAX { s } else { T::MAX };
+    }
+    squared
+}
+
+/// One pass over all correspondences for a model of `x2 ~ H x1`.
+pub(crate) fn transfer_equations<T, B, M, const P: usize>(
+    data: BlockSlice<'_, B>,
+    model: &M,
+    loss: &Loss<T>,
+) -> NormalEquations<T, P>
+where
+    T: Real,
+    B: EpipolarBlock<T>,
+    M: Manifold<T, P>,
+{
+    let h = model.matrix();
+    let zero = [T::ZERO; LANES];
+    // Six scalars (00, 01, 11, 02, 12, 22 of the rows of H) times the six products of the point's coordinates.
+    let mut products = [[zero; 6]; 6];
+    let mut slopes = [[zero; 3]; 3];
+    let mut cost = zero;
+    let mut active = 0u32;
+    let support = loss.support().unwrap_or(T::MAX);
+    let beyond = if support < T::MAX { loss.evaluate(support).0 } else { T::ZERO };
+    let mut left = data.count;
+    for block in data.blocks {
+        let (plane, weights) = block.planes();
+        for l in 0..LANES {
+            let (x, y) = (plane[0][l], plane[1][l]);
+            let t = Transfer::new(&h, x, y, plane[2][l], plane[3][l]);
+            let squared = t.squared() * weights[l];
+            // Written so that a NaN is left out.
+            if l >= left || !(squared < support && t.inverse_z > T::ZERO) {
+                continue;
+            }
+            let (loss, weight) = loss.evaluate(squared);
+            cost[l] += loss;
+            active += 1;
+            let weight = weight * weights[l];
+            let (w00, w01, w11) = (weight * t.w[0], weight * t.w[1], weight * t.w[2]);
+            let (w02, w12) = (-(w00 * t.u + w01 * t.v), -(w01 * t.u + w11 * t.v));
+            let w22 = -(w02 * t.u + w12 * t.v);
+            let (a, b, c) = (x * t.inverse_z, y * t.inverse_z, t.inverse_z);
+            let point = [a * a, a * b, b * b, a * c, b * c, c * c];
+            for (sums, w) in products.iter_mut().zip([w00, w01, w11, w02, w12, w22]) {
+                for (sum, p) in sums.iter_mut().zip(point) {
+                    sum[l] += w * p;
+                }
+            }
+            let (p, q) = (w00 * t.ex + w01 * t.ey, w01 * t.ex + w11 * t.ey);
+            let r = -(t.u * p + t.v * q);
+            for (sums, s) in slopes.iter_mut().zip([p, q, r]) {
+                sums[0][l] += s * a;
+                sums[1][l] += s * b;
+                sums[2][l] += s * c;
+            }
+        }
+        left = left.saturating_sub(LANES);
+    }
+    let total = |lanes: &Lanes<T>| (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
+    // Index of the pair (i, j) among 00, 01, 11, 02, 12, 22.
+    const PAIR: [[usize; 3]; 3] = [[0, 1, 3], [1, 2, 4], [3, 4, 5]];
+    let tangents = model.tangents();
+    let mut hessian = SMatrix::<T, P, P>::zeros();
+    let mut gradient = SVector::<T, P>::zeros();
+    for q in 0..P {
+        let mut image = [T::ZERO; 9];
+        for i in 0..3 {
+            for j in 0..3 {
+                let mut sum = T::ZERO;
+                for k in 0..3 {
+                    for m in 0..3 {
+                        sum += total(&products[PAIR[i][k]][PAIR[j][m]]) * tangents[q][3 * k + m];
+                    }
+                }
+                image[3 * i + j] = sum;
+            }
+        }
+        for p in 0..P {
+            let mut sum = T::ZERO;
+            for k in 0..9 {
+                sum += tangents[p][k] * image[k];
+            }
+            hessian.data.0[q][p] = sum;
+        }
+        let mut sum = T::ZERO;
+        for i in 0..3 {
+            for j in 0..3 {
+                sum += total(&slopes[i][j]) * tangents[q][3 * i + j];
+            }
+        }
+        gradient.data.0[0][q] = sum;
+    }
+    let outside = (data.count as u32).saturating_sub(active);
+    let cost = total(&cost) + crate::real::from_u32::<T>(outside) * beyond;
+    NormalEquations { hessian, gradient, cost, active }
+}
+
+/// A homography with |H| = 1 and positive determinant.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HomographyModel<T: Real>(pub(crate) Matrix3<T>);
+
+impl<T: Real> HomographyModel<T> {
+    /// Scales a homography; none where it is singular or not finite.
+    pub(crate) fn new(h: &Matrix3<T>) -> Option<Self> {
+        let size = sqrt(h.norm_squared());
+        if !(size > T::ZERO && size <= T::MAX) {
+            return None;
+        }
+        let h = h * (T::ONE / size);
+        let determinant = h.determinant();
+        if abs(determinant) > T::EPSILON {
+            Some(Self(if determinant < T::ZERO { -h } else { h }))
+        } else {
+            None
+        }
+    }
+}
+
+impl<T: Real> Manifold<T, 8> for HomographyModel<T> {
+    fn matrix(&self) -> Matrix3<T> {
+        self.0
+    }
+
+    /// An orthonormal basis of the directions that change more than the scale: the columns, but the first, of the
+    /// reflection that takes the first axis to -h or h.
+    fn tangents(&self) -> [[T; 9]; 8] {
+        let m = self.0.transpose();
+        let mut v = [T::ZERO; 9];
+        for (v, &h) in v.iter_mut().zip(m.iter()) {
+            *v = h;
+        }
+        v[0] += if v[0] < T::ZERO { -T::ONE } else { T::ONE };
+        let scale = T::TWO / v.iter().fold(T::ZERO, |sum, &x| sum + x * x);
+        let mut basis = [[T::ZERO; 9]; 8];
+        for p in 0..8 {
+            for k in 0..9 {
+                basis[p][k] = -(scale * v[p + 1] * v[k]);
+            }
+            basis[p][p + 1] += T::ONE;
+        }
+        basis
+    }
+
+    fn retract(&self, step: &SVector<T, 8>) -> Self {
+        let basis = self.tangents();
+        let mut h = self.0;
+        for i in 0..3 {
+            for j in 0..3 {
+                for p in 0..8 {
+                    h.data.0[j][i] += basis[p][3 * i + j] * step.data.0[0][p];
+                }
+            }
+        }
+        Self(h * (T::ONE / sqrt(h.norm_squared())))
+    }
+}
+
+/// A rotation between two views, as a homography of the blocks' coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RotationModel<T: Real> {
+    pub(crate) rotation: Matrix3<T>,
+    pub(crate) scales: Scales<T>,
+}
+
+impl<T: Real> Manifold<T, 3> for RotationModel<T> {
+    fn matrix(&self) -> Matrix3<T> {
+        self.scales.transfer(&self.rotation)
+    }
+
+    fn tangents(&self) -> [[T; 9]; 3] {
+        let mut result = [[T::ZERO; 9]; 3];
+        let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+        for (tangent, axis) in result.iter_mut().zip(axes) {
+            let mut m = self.rotation;
+            for column in &mut m.data.0 {
+                let turned = axis.cross(&Vector3::new(column[0], column[1], column[2]));
+                *column = [turned.x, turned.y, turned.z];
+            }
+            let m = self.scales.transfer(&m);
+            for i in 0..3 {
+                for j in 0..3 {
+                    tangent[3 * i + j] = m.data.0[j][i];
+                }
+            }
+        }
+        result
+    }
+
+    fn retract(&self, step: &SVector<T, 3>) -> Self {
+        let w = Vector3::new(step.data.0[0][0], step.data.0[0][1], step.data.0[0][2]);
+        Self { rotation: cayley(&w) * self.rotation, scales: self.scales }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn blocks() -> [PlaneBlock<f64>; 3] {
+        let mut blocks = [[[0.0; 4]; 4]; 3];
+        for (i, x) in blocks.iter_mut().flatten().flatten().enumerate() {
+            *x = ((i * i) as f64 * 0.7).sin();
+        }
+        blocks
+    }
+
+    /// The weight of the Sampson error is held fixed in a step, so the gradient of the cost with fixed weights is
+    /// what the sums must give: checked where the error itself is zero, by the curvature.
+    #[test]
+    fn curvature_agrees_with_central_differences_at_the_truth() {
+        let h = Matrix3::new(1.0, 0.1, 0.05, -0.08, 0.95, 0.1, 0.1, -0.2, 1.1);
+        let model = HomographyModel::new(&h).unwrap();
+        let mut blocks = blocks();
+        for block in &mut blocks {
+            for l in 0..4 {
+                let y = h * Vector3::new(block[0][l], block[1][l], 1.0);
+                (block[2][l], block[3][l]) = (y.x / y.z, y.y / y.z);
+            }
+        }
+        let data = BlockSlice { blocks: &blocks, count: 11 };
+        let sums = transfer_equations::<_, _, _, 8>(data, &model, &Loss::Squared);
+        assert!(sums.cost < 1e-25 && sums.active == 11);
+        for p in 0..8 {
+            let step = 1e-5;
+            let moved = |s: f64| {
+                let mut delta = SVector::<f64, 8>::zeros();
+                delta[p] = s;
+                transfer_equations::<_, _, _, 8>(data, &model.retract(&delta), &Loss::Squared).cost
+            };
+            let curvature = (moved(step) + moved(-step)) / (2.0 * step * step);
+            let expected = sums.hessian[(p, p)];
+            assert!((curvature / expected - 1.0).abs() < 1e-4, "{p}: {curvature} {expected}");
+        }
+    }
+}
