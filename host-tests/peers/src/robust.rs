@@ -4,7 +4,9 @@ use std::cell::RefCell;
 use std::slice::from_raw_parts;
 
 use epipole::Real;
-use epipole::estimate::{RelativePoseEstimate, RelativePoseOptions, TwoViewWorkspace, relative_pose_guided};
+use epipole::estimate::{
+    RelativePoseEstimate, RelativePoseOptions, RelativePoseVerdict, TwoViewWorkspace, relative_pose_guided,
+};
 use epipole::geometry::{Pinhole, Pose};
 use epipole::nalgebra::Vector2;
 use epipole::robust::Guide;
@@ -140,6 +142,50 @@ macro_rules! relative_pose_symbols {
                     None => -1,
                 },
                 None => -2,
+            }
+        }
+
+        /// # Safety
+        /// The arrays have the lengths that the comparison programs state.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $verdict(
+            x1: *const $t,
+            x2: *const $t,
+            n: i32,
+            k: *const $t,
+            threshold: $t,
+            confidence: $t,
+            max_iterations: i32,
+            seed: u64,
+            out: *mut $t,
+        ) -> i32 {
+            let count = n as usize;
+            let (x1, x2, k, out) = unsafe {
+                (
+                    from_raw_parts(x1, 2 * count),
+                    from_raw_parts(x2, 2 * count),
+                    from_raw_parts(k, 4),
+                    std::slice::from_raw_parts_mut(out, 24),
+                )
+            };
+            let call = Call { max_error_px: threshold, confidence, max_iterations, seed };
+            let estimate = $memory.with_borrow_mut(|memory| relative_pose(memory, x1, x2, k, &call, None));
+            match estimate.map(|estimate| estimate.verdict) {
+                Some(RelativePoseVerdict::General(motion)) => {
+                    write_pose(&motion.pose, out);
+                    0
+                }
+                Some(RelativePoseVerdict::Planar(poses)) => {
+                    // One pose where the other twin is not visible: it stands for both.
+                    for (half, pose) in out.chunks_exact_mut(12).zip(poses.iter().cycle()) {
+                        write_pose(&pose.pose, half);
+                    }
+                    1
+                }
+                Some(RelativePoseVerdict::PureRotation(_)) => 2,
+                Some(RelativePoseVerdict::NoMotion) => 3,
+                Some(_) => 4,
+                None => -1,
             }
         }
     };

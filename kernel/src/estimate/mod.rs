@@ -11,6 +11,7 @@
 mod absolute_pose;
 mod load;
 mod relative_pose;
+mod transfer;
 mod workspace;
 
 pub use absolute_pose::{
@@ -25,3 +26,20 @@ pub use relative_pose::{
 pub use workspace::{
     RelativePoseStorage, RelativePoseWorkspace, TwoViewStorage, TwoViewWorkspace, WideTwoViewStorage,
 };
+
+/// A stride near the golden ratio of `blocks` and coprime to it: steps of it visit every block once, and early ones
+/// are spread over the whole list, so that an order in the input (best match first) does not mislead the early exit.
+pub(crate) fn stride(blocks: usize) -> usize {
+    let first = blocks * 5 / 8;
+    (first..first + 64).find(|&stride| gcd(stride, blocks) == 1).unwrap_or(1)
+}
+
+fn gcd(mut a: usize, mut b: usize) -> usize {
+    for _ in 0..128 {
+        if b == 0 {
+            break;
+        }
+        (a, b) = (b, a % b);
+    }
+    a
+}

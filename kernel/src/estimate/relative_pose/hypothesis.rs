@@ -13,6 +13,8 @@ use crate::robust::loss::Loss;
 use crate::robust::{Estimator, Gate, Score, ScoreCounts, Tally};
 use crate::solvers::relpose_5pt;
 
+use super::super::stride;
+
 /// Correspondences and what a score of them needs.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PoseProblem<'a, T, B> {
@@ -109,23 +111,6 @@ struct View<T: Real> {
     scale: T,
 }
 
-/// A stride near the golden ratio of `blocks` and coprime to it: steps of it visit every block once, and early ones
-/// are spread over the whole list, so that an order in the input (best match first) does not mislead the early exit.
-fn stride(blocks: usize) -> usize {
-    let first = blocks * 5 / 8;
-    (first..first + 64).find(|&stride| gcd(stride, blocks) == 1).unwrap_or(1)
-}
-
-fn gcd(mut a: usize, mut b: usize) -> usize {
-    for _ in 0..128 {
-        if b == 0 {
-            break;
-        }
-        (a, b) = (b, a % b);
-    }
-    a
-}
-
 impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
     type Model = PoseModel<T>;
 
@@ -144,7 +129,8 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
             return false;
         }
         for essential in &relpose_5pt(&f1, &f2) {
-            if let Some((rotation, translation)) = pose_in_front(essential, &f1, &f2) {
+            if let Some((rotation, translation)) = pose_in_front(essential, &f1, &f2, self.scales.parallel_sq)
+            {
                 found(&PoseModel { rotation, translation, scales: self.scales });
             }
         }
@@ -211,8 +197,8 @@ fn repeated<T: Real>(points: &[Vector3<T>; 5], distance: T) -> bool {
     false
 }
 
-/// The one pose of an essential matrix for which all five points lie in front of both cameras; none where there is
-/// none. Horn's closed form, without a singular value decomposition.
+/// The first pose of an essential matrix for which all five points lie in front of both cameras, those with parallel
+/// rays left aside; none where there is none. Horn's closed form, without a singular value decomposition.
 ///
 /// # References
 /// B. K. P. Horn, "Recovering baseline and orientation from essential matrix", 1990.
@@ -220,6 +206,7 @@ fn pose_in_front<T: Real>(
     essential: &Essential<T>,
     f1: &[Vector3<T>; 5],
     f2: &[Vector3<T>; 5],
+    parallel_sq: T,
 ) -> Option<(Matrix3<T>, Vector3<T>)> {
     let e = &essential.0;
     let columns = [e.column(0).into_owned(), e.column(1).into_owned(), e.column(2).into_owned()];
@@ -249,6 +236,9 @@ fn pose_in_front<T: Real>(
         for (x1, x2) in f1.iter().zip(f2) {
             let a = rotation * x1;
             let (aa, bb, ab) = (a.norm_squared(), x2.norm_squared(), a.dot(x2));
+            if aa * bb - ab * ab <= parallel_sq * aa * bb && ab > T::ZERO {
+                continue;
+            }
             let (ta, tb) = (t.dot(&a), t.dot(x2));
             let (depth1, depth2) = (ab * tb - bb * ta, aa * tb - ab * ta);
             if !(depth1 * depth2 > T::ZERO && depth1 * sign >= T::ZERO) {

@@ -7,18 +7,22 @@ use nalgebra::Vector2;
 use super::load::{Units, check_pixels, load_bearings, load_planes};
 use super::workspace::RelativePoseWorkspace;
 use crate::geometry::CameraModel;
-use crate::linalg::{LANES, Ldlt};
-use crate::real::{from_u32, lit, max, sqrt};
+use crate::linalg::LANES;
 use crate::refine::blocks::{BearingBlock, BlockSlice, EpipolarBlock, PlaneBlock};
 use crate::robust::budget::check_noise;
-use crate::robust::loss::Loss;
 use crate::robust::{Guide, OptionsError, RansacOptions, rank_by_score, ransac};
 use crate::{InputError, Real};
 
+mod covariance;
+mod degenerate;
+mod evidence;
 mod hypothesis;
+mod judge;
+mod planar;
 mod verdict;
 
 use hypothesis::PoseProblem;
+use judge::{Judge, Judgement};
 pub use verdict::{
     GeneralMotion, PlanarPose, PureRotation, RelativePoseEstimate, RelativePoseVerdict, Unobservable,
 };
@@ -126,7 +130,7 @@ pub fn relative_pose_guided<T: Real>(
     guide: Guide<'_, T>,
     workspace: &mut RelativePoseWorkspace<'_, T>,
 ) -> Result<RelativePoseEstimate<T>, RelativePoseError> {
-    check_noise(options.max_error_px, options.sigma_px)?;
+    let sigma_px = check_noise(options.max_error_px, options.sigma_px)?;
     options.ransac.check()?;
     let planes = camera1.rectilinear().zip(camera2.rectilinear());
     let capacity = match planes {
@@ -143,18 +147,22 @@ pub fn relative_pose_guided<T: Real>(
     Ok(match planes {
         Some((a, b)) => {
             let units = load_planes(camera1, camera2, [a, b], x1, x2, workspace);
-            estimate::<T, PlaneBlock<T>>(units, options, guide, workspace)
+            estimate::<T, PlaneBlock<T>>(units, sigma_px, options, guide, workspace)
         }
         None => {
             let units = load_bearings(camera1, camera2, x1, x2, workspace);
-            estimate::<T, BearingBlock<T>>(units, options, guide, workspace)
+            estimate::<T, BearingBlock<T>>(units, sigma_px, options, guide, workspace)
         }
     })
 }
 
+/// The smallest consensus of interest to the search; the verdict asks for more where chance demands it.
+const LEAST_INLIERS: u32 = 10;
+
 /// The verdict on loaded correspondences.
 fn estimate<T: Real, B: EpipolarBlock<T>>(
     units: Units<T>,
+    sigma_px: T,
     options: &RelativePoseOptions<T>,
     guide: Guide<'_, T>,
     workspace: &mut RelativePoseWorkspace<'_, T>,
@@ -171,34 +179,17 @@ fn estimate<T: Real, B: EpipolarBlock<T>>(
         }
         None => None,
     };
-    let consensus = ransac(&problem, &options.ransac, order, 10, guide.keep_going);
-    let Some((model, _)) = consensus.models[0] else {
-        workspace.inliers.iter_mut().take(count).for_each(|inlier| *inlier = false);
-        return RelativePoseEstimate {
-            verdict: RelativePoseVerdict::NoConsensus,
-            noise_px: T::ZERO,
-            report: consensus.report,
-        };
-    };
-    // What lies beyond two thresholds is an outlier; what lies between still helps, with a falling weight.
-    let loss = Loss::Tukey(problem.threshold * T::TWO);
-    let minimum = problem.optimise(&model, &loss, 10, lit(1e-6));
-    let model = minimum.model;
-    let mut mask = workspace.inliers.iter_mut();
-    problem.for_each_block(&model, |_, squared, filled| {
-        for (inlier, &s) in mask.by_ref().take(filled).zip(squared) {
-            *inlier = s < T::ONE;
+    let consensus = ransac(&problem, &options.ransac, order, LEAST_INLIERS, guide.keep_going);
+    let mut report = consensus.report;
+    let judge = Judge { problem: &problem, sigma: sigma_px / units.pixels, seed: options.ransac.seed };
+    let mask = workspace.inliers.get_mut(..count).unwrap_or_default();
+    let Judgement { verdict, noise } = match &consensus.models[0] {
+        Some((model, _)) => judge.verdict(model, mask, workspace.order),
+        None => {
+            mask.iter_mut().for_each(|inlier| *inlier = false);
+            Judgement { verdict: judge.without_model(), noise: T::ZERO }
         }
-    });
-    let sums = &minimum.equations;
-    let freedom = from_u32::<T>(sums.active.saturating_sub(6) + 1);
-    let outside = from_u32::<T>((count as u32).saturating_sub(sums.active));
-    let squares = sums.cost - outside * problem.threshold * problem.threshold;
-    let variance = max(squares, T::ZERO) / freedom;
-    let covariance = Ldlt::new(&sums.hessian).map(|factors| factors.inverse() * variance);
-    RelativePoseEstimate {
-        verdict: RelativePoseVerdict::General(GeneralMotion { pose: model.pose(), covariance }),
-        noise_px: sqrt(variance) * units.pixels,
-        report: consensus.report,
-    }
+    };
+    report.inliers = mask.iter().map(|&inlier| inlier as u32).sum();
+    RelativePoseEstimate { verdict, noise_px: noise * units.pixels, report }
 }

@@ -1,0 +1,198 @@
+//! Which of the simpler models (no motion, a rotation, a plane) the inliers of a relative pose leave standing.
+//!
+//! A simpler model is given up where the data prove parallax against it, in one of two ways.
+//!
+//! By count: correspondences that it leaves unexplained agree with the pose more often than chance. Of `m` unexplained
+//! ones `k` agree; a wrong one agrees with the probability `p`, the share of the image within the threshold of an
+//! epipolar line; the pose has two degrees of freedom left once the simpler model is given, so that the expected number
+//! of accidents as good as this is at most `C(m, 2) P(B(m - 2, p) >= k - 2)`: it must be below `ACCIDENTS`.
+//!
+//! By scatter: on the correspondences that it does explain, the squared error across the epipolar lines is what noise
+//! is, and the one along them must not be larger: the ratio of both is compared with an F distribution's deviation.
+//!
+//! # References
+//! L. Moisan, B. Stival, "A probabilistic criterion to detect rigid point matches between two images", IJCV 2004 (the
+//! number of false alarms).
+//! O. Chum, T. Werner, J. Matas, "Two-view geometry estimation unaffected by a dominant plane", CVPR 2005 (off-plane
+//! correspondences decide).
+//! P. Torr, "An assessment of information criteria for motion model selection", CVPR 1997 (the models and their
+//! degrees of freedom).
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::Real;
+use crate::geometry::pose::nearest_rotation;
+use crate::linalg::{LANES, Lanes};
+use crate::real::{from_u32, lit, ln, max, min, sqrt};
+use crate::refine::blocks::EpipolarBlock;
+use crate::refine::homography::{RotationModel, transfer_sq};
+use crate::refine::lm::Manifold;
+use crate::refine::relative_pose::PoseModel;
+use crate::robust::log_binomial_tail;
+
+use super::hypothesis::PoseProblem;
+
+/// Accidents expected at the most where something counts as proven.
+const ACCIDENTS: f64 = 0.01;
+/// A correspondence is explained by a simpler model up to this many standard deviations in two dimensions: of true
+/// ones 4 in a million lie beyond.
+pub(super) const EXPLAINED_SIGMAS: f64 = 5.0;
+/// Deviations of the ratio of scatters beyond which parallax is proven.
+const SCATTER_DEVIATIONS: f64 = 5.0;
+
+/// ln of the number of ways to choose `k` of `n`, for small `k`.
+fn ln_choose<T: Real>(n: u32, k: u32) -> T {
+    let mut sum = T::ZERO;
+    for i in 0..core::cmp::min(k, 8) {
+        if n > i {
+            sum += ln(from_u32::<T>(n - i) / from_u32::<T>(i + 1));
+        }
+    }
+    sum
+}
+
+/// True where `agreeing` of `count` correspondences agree with a model fitted to `freedom` of them more often than
+/// wrong ones do by accident with probability `p` each.
+pub(super) fn beyond_chance<T: Real>(count: u32, agreeing: u32, freedom: u32, p: T) -> bool {
+    if agreeing <= freedom || count <= freedom {
+        return false;
+    }
+    let tail = log_binomial_tail(count - freedom, agreeing - freedom, p);
+    ln_choose::<T>(count, freedom) + tail < ln(lit(ACCIDENTS))
+}
+
+/// How a simpler model explains the inliers of a pose.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Explained<T> {
+    /// Correspondences, inliers of the pose or not, that the model explains.
+    pub(super) all: u32,
+    /// Inliers of the pose that it explains.
+    pub(super) inliers: u32,
+    /// Inliers of the pose that it does not.
+    pub(super) others: u32,
+    /// Sum over the explained inliers of the squared error in two dimensions, in units of sigma.
+    pub(super) squares: T,
+    /// Sum over the same of the squared error across the epipolar lines.
+    pub(super) across: T,
+}
+
+/// The evidence of one problem.
+pub(super) struct Evidence<'a, 'b, T: Real, B> {
+    pub(super) problem: &'a PoseProblem<'b, T, B>,
+    /// Which correspondences are inliers of the pose.
+    pub(super) inliers: &'a [bool],
+    /// The pose's matrix in the blocks' coordinates.
+    pub(super) epipolar: Matrix3<T>,
+    /// Standard deviation of a coordinate in the blocks' unit.
+    pub(super) sigma: T,
+    /// The chance of a wrong correspondence to lie within the threshold of its epipolar line.
+    pub(super) accident: T,
+}
+
+impl<T: Real, B: EpipolarBlock<T>> Evidence<'_, '_, T, B> {
+    /// How a model `x2 ~ H x1` explains the inliers.
+    pub(super) fn explained(&self, h: &Matrix3<T>) -> Explained<T> {
+        let scale = T::ONE / (self.sigma * self.sigma);
+        let limit: T = lit(EXPLAINED_SIGMAS * EXPLAINED_SIGMAS);
+        let mut result = Explained { all: 0, inliers: 0, others: 0, squares: T::ZERO, across: T::ZERO };
+        let mut mask = self.inliers.iter();
+        for block in self.problem.data.blocks {
+            let (plane, mut weight) = block.planes();
+            weight.iter_mut().for_each(|w| *w *= scale);
+            let squared = transfer_sq(h, &plane, &weight);
+            let (c, d) = block.residual(&self.epipolar);
+            for (l, &inlier) in (0..LANES).zip(mask.by_ref()) {
+                let explained = squared[l] < limit;
+                result.all += explained as u32;
+                if inlier && explained {
+                    result.inliers += 1;
+                    result.squares += squared[l];
+                    result.across += c[l] * c[l] * scale / d[l];
+                } else if inlier {
+                    result.others += 1;
+                }
+            }
+        }
+        result
+    }
+
+    /// True where the data prove parallax against a simpler model with `parameters` degrees of freedom.
+    pub(super) fn proves_parallax(&self, count: u32, explained: &Explained<T>, parameters: u32) -> bool {
+        let unexplained = count.saturating_sub(explained.all);
+        if beyond_chance(unexplained, explained.others, 2, self.accident) {
+            return true;
+        }
+        let n = explained.inliers;
+        if n <= parameters {
+            return true;
+        }
+        let (along, free) = (explained.squares - explained.across, from_u32::<T>(n));
+        // The pose takes 5 of the freedom across; the model's parameters beyond those lie along.
+        let along = along / from_u32((n + 5).saturating_sub(parameters));
+        // Noise below half of what it is said to be is not believed.
+        let across = max(explained.across / from_u32(n.saturating_sub(5) + 1), lit(0.25));
+        along > across * (T::ONE + lit::<T>(SCATTER_DEVIATIONS) * T::TWO / sqrt(free))
+    }
+
+    /// The rotation that explains the inliers best, by alternating between the closest rotation of all that are
+    /// explained and the choice of those; none where they leave one open.
+    pub(super) fn rotation(&self, start: &PoseModel<T>) -> Option<RotationModel<T>> {
+        let mut model = RotationModel { rotation: start.rotation, scales: start.scales };
+        let mut limit: T = T::MAX;
+        for round in 0..6 {
+            let h = model.matrix();
+            let mut moment = Matrix3::zeros();
+            let mut mask = self.inliers.iter();
+            let (s1, s2) = (start.scales.inverse1(), start.scales.inverse2());
+            for block in self.problem.data.blocks {
+                let (plane, weight) = block.planes();
+                let squared = transfer_sq(&h, &plane, &weight);
+                let (f1, f2) = block.directions();
+                for (l, &inlier) in (0..LANES).zip(mask.by_ref()) {
+                    if inlier && (round == 0 || squared[l] < limit) {
+                        let unit = |f: &[Lanes<T>; 3], s: [T; 2]| {
+                            let v = Vector3::new(f[0][l] * s[0], f[1][l] * s[1], f[2][l]);
+                            v * (T::ONE / sqrt(v.norm_squared()))
+                        };
+                        moment += unit(&f2, s2) * unit(&f1, s1).transpose();
+                    }
+                }
+            }
+            model.rotation = nearest_rotation(&moment)?;
+            // From coarse to fine, so that a few wrong ones do not hold the rest.
+            let factor: T = lit([64.0, 24.0, 12.0, 8.0, 5.0, 5.0][round]);
+            limit = factor * factor * self.sigma * self.sigma;
+        }
+        Some(model)
+    }
+}
+
+/// The chance of a wrong correspondence to lie within `threshold` of an epipolar line by the Sampson error: the area of
+/// the band over that of the rectangle that the points of view 2 fill.
+pub(super) fn accident<T: Real, B: EpipolarBlock<T>>(problem: &PoseProblem<'_, T, B>) -> T {
+    let (mut low, mut high) = ([T::MAX; 3], [-T::MAX; 3]);
+    let mut left = problem.data.count;
+    for block in problem.data.blocks {
+        let (_, f2) = block.directions();
+        for l in 0..LANES {
+            for k in 0..3 {
+                if l < left && f2[k][l] > -T::MAX && f2[k][l] < T::MAX {
+                    low[k] = min(low[k], f2[k][l]);
+                    high[k] = max(high[k], f2[k][l]);
+                }
+            }
+        }
+        left = left.saturating_sub(LANES);
+    }
+    // The two longer sides (a plane's third is zero), the shorter of them first.
+    let mut sides = [T::ZERO; 3];
+    for k in 0..3 {
+        sides[k] = max(high[k] - low[k], T::ZERO);
+    }
+    let longest = max(max(sides[0], sides[1]), sides[2]);
+    let shortest = min(min(sides[0], sides[1]), sides[2]);
+    let middle = sides[0] + sides[1] + sides[2] - longest - shortest;
+    // Sampson's error is the distance to the line over sqrt 2 where both lines are alike; the band has two sides.
+    let band = lit::<T>(2.0 * core::f64::consts::SQRT_2) * problem.threshold;
+    if middle > band { band / middle } else { T::ONE }
+}
