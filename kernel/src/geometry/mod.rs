@@ -5,6 +5,7 @@ pub mod cheirality;
 mod essential;
 mod fundamental;
 mod homography;
+pub(crate) mod object_space;
 pub mod pose;
 pub mod residual;
 pub mod triangulation;

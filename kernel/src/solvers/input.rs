@@ -1,6 +1,6 @@
 //! What the solvers of any number of correspondences ask of their input.
 
-use nalgebra::Vector3;
+use nalgebra::{SVector, Vector3};
 
 use crate::real::is_finite;
 use crate::{InputError, Real};
@@ -16,6 +16,26 @@ pub(super) fn check_lengths<T: Real>(
     }
     if x1.len() < needed {
         return Err(InputError::TooFew { given: x1.len(), needed });
+    }
+    Ok(())
+}
+
+/// [`check_lengths`], and every coordinate finite: for solvers that would not fail by themselves.
+pub(super) fn check<T: Real>(x1: &[Vector3<T>], x2: &[Vector3<T>], needed: usize) -> Result<(), InputError> {
+    check_lengths(x1, x2, needed)?;
+    check_finite(x1, 0)?;
+    check_finite(x2, 1)
+}
+
+/// No NaN and no infinity in the array of that number.
+pub(super) fn check_finite<T: Real, const N: usize>(
+    vectors: &[SVector<T, N>],
+    array: usize,
+) -> Result<(), InputError> {
+    for (index, vector) in vectors.iter().enumerate() {
+        if !vector.iter().all(|&x| is_finite(x)) {
+            return Err(InputError::NotFinite { array, index });
+        }
     }
     Ok(())
 }
