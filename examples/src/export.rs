@@ -6,10 +6,13 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
-use epipole::nalgebra::{Isometry3, Vector3};
+use epipole::geometry::{Camera, CameraModel};
+use epipole::nalgebra::{Isometry3, Point3, Vector3};
+use image::RgbImage;
 
 use crate::lens::CameraParameters;
 use crate::matching::Match;
+use crate::two_view::TwoView;
 
 /// A triangulated correspondence.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +34,30 @@ pub struct View<'a> {
     pub camera: CameraParameters,
     /// World (the frame of view 1) to camera.
     pub pose: Isometry3<f64>,
+}
+
+/// The points in front of both cameras, coloured as in image 1, with their reprojection errors.
+#[must_use]
+pub fn scene_points(
+    image: &RgbImage,
+    cameras: &[Camera<f64>; 2],
+    matches: &[Match],
+    found: &TwoView,
+) -> Vec<ScenePoint> {
+    let poses = [Isometry3::identity(), found.pose];
+    let points = found.points.iter().filter_map(|&(index, position)| {
+        let pixels = [matches[index].x1, matches[index].x2];
+        let mut error_px = 0.0;
+        for ((camera, pose), pixel) in cameras.iter().zip(&poses).zip(pixels) {
+            let seen = camera.project(&(pose * Point3::from(position)).coords)?;
+            error_px += (seen.x - pixel[0]).hypot(seen.y - pixel[1]) / 2.0;
+        }
+        let at = |x: f64, side: u32| (x.round().max(0.0) as u32).min(side - 1);
+        let [x, y] = pixels[0];
+        let colour = image.get_pixel(at(x, image.width()), at(y, image.height())).0;
+        Some(ScenePoint { position, colour, pixels, error_px })
+    });
+    points.collect()
 }
 
 /// The points with their colours, as a PLY file.

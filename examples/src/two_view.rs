@@ -1,5 +1,7 @@
 //! From matched pixels of two images to a pose, inliers and points, in either scalar.
 
+use std::str::FromStr;
+
 use epipole::Real;
 use epipole::estimate::{self, RelativePoseOptions, TwoViewWorkspace};
 use epipole::geometry::triangulation::{Triangulation, ViewPair};
@@ -7,7 +9,7 @@ use epipole::geometry::{Camera, CameraModel, Pose};
 use epipole::nalgebra::{Isometry3, Matrix3, Quaternion, UnitQuaternion, Vector2, Vector3};
 use epipole::real::lit;
 
-use crate::lens::CameraParameters;
+use crate::lens::{CameraParameters, numbers};
 use crate::matching::Match;
 
 /// What a user may choose of the estimation.
@@ -99,6 +101,38 @@ fn triangulate<T: Real>(
     };
     let pairs = x1.iter().zip(x2).zip(inliers).enumerate().filter(|(_, (_, inlier))| **inlier);
     pairs.filter_map(|(index, ((p, q), _))| point(p, q).map(|x| (index, x))).collect()
+}
+
+/// A pose as it is compared and written: a rotation matrix and a translation. It is parsed from twelve numbers, `R`
+/// row-major and `t`.
+#[derive(Clone, Copy, Debug)]
+pub struct Truth {
+    pub rotation: Matrix3<f64>,
+    pub translation: Vector3<f64>,
+}
+
+impl FromStr for Truth {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let n = numbers(text)?;
+        if n.len() != 12 {
+            return Err(format!("{} numbers given, 12 needed: r11,r12,..,r33,tx,ty,tz", n.len()));
+        }
+        let rotation = Matrix3::from_row_slice(&n[..9]);
+        let translation = Vector3::from_column_slice(&n[9..]);
+        if (rotation * rotation.transpose() - Matrix3::identity()).norm() > 1e-3 {
+            return Err("the first nine numbers are not a rotation".into());
+        }
+        Ok(Self { rotation, translation })
+    }
+}
+
+impl From<Isometry3<f64>> for Truth {
+    fn from(pose: Isometry3<f64>) -> Self {
+        let rotation = pose.rotation.to_rotation_matrix().into_inner();
+        Self { rotation, translation: pose.translation.vector }
+    }
 }
 
 /// The angle between two rotations in degrees, by the chord: `|A - B|_F = 2 sqrt 2 sin(angle / 2)`.

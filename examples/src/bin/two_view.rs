@@ -9,14 +9,16 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Parser;
-use epipole::nalgebra::{Isometry3, Matrix3, Vector3};
-use epipole_examples::export::{ScenePoint, View, write_colmap, write_matches, write_ply};
+use epipole::nalgebra::Isometry3;
+use epipole_examples::export::{View, scene_points, write_colmap, write_matches, write_ply};
 use epipole_examples::features::{FeatureOptions, detect};
-use epipole_examples::lens::{CameraParameters, FisheyeCoefficients, Lens, numbers};
+use epipole_examples::lens::{CameraParameters, FisheyeCoefficients, Lens};
 use epipole_examples::matching::{Match, match_features};
-use epipole_examples::two_view::{Settings, TwoView, direction_error_deg, estimate, rotation_error_deg};
+use epipole_examples::two_view::{
+    Settings, Truth, TwoView, direction_error_deg, estimate, rotation_error_deg,
+};
 use epipole_examples::{align, picture, render};
-use image::{DynamicImage, RgbImage};
+use image::{DynamicImage, ImageReader, RgbImage};
 use serde_json::json;
 
 #[derive(Parser)]
@@ -73,37 +75,6 @@ struct Arguments {
     dump: Option<PathBuf>,
 }
 
-/// `R` row-major and `t`.
-#[derive(Clone, Copy, Debug)]
-struct Truth {
-    rotation: Matrix3<f64>,
-    translation: Vector3<f64>,
-}
-
-impl std::str::FromStr for Truth {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let n = numbers(text)?;
-        if n.len() != 12 {
-            return Err(format!("{} numbers given, 12 needed: r11,r12,..,r33,tx,ty,tz", n.len()));
-        }
-        let rotation = Matrix3::from_row_slice(&n[..9]);
-        let translation = Vector3::from_column_slice(&n[9..]);
-        if (rotation * rotation.transpose() - Matrix3::identity()).norm() > 1e-3 {
-            return Err("the first nine numbers are not a rotation".into());
-        }
-        Ok(Self { rotation, translation })
-    }
-}
-
-impl From<Isometry3<f64>> for Truth {
-    fn from(pose: Isometry3<f64>) -> Self {
-        let rotation = pose.rotation.to_rotation_matrix().into_inner();
-        Self { rotation, translation: pose.translation.vector }
-    }
-}
-
 /// Two images and what is known about them.
 struct Input {
     names: [String; 2],
@@ -129,7 +100,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         _ => built_in(arguments)?,
     };
     let [w, h] = [input.images[0].width(), input.images[0].height()];
-    println!("{} and {}, {w} x {h}, read in {:.2} s", input.names[0], input.names[1], seconds(start));
+    let verb = if arguments.images.is_empty() { "rendered" } else { "read" };
+    println!("{} and {}, {w} x {h}, {verb} in {:.2} s", input.names[0], input.names[1], seconds(start));
 
     let start = Instant::now();
     let options = FeatureOptions { max_features: arguments.features, ..Default::default() };
@@ -205,8 +177,11 @@ fn read(arguments: &Arguments, paths: [&Path; 2]) -> Result<Input, Box<dyn Error
         fisheye(camera, arguments.fisheye)?,
         fisheye(arguments.camera2.unwrap_or(camera), arguments.fisheye2.or(arguments.fisheye))?,
     ];
-    let open = |path: &Path| {
-        image::open(path).map(DynamicImage::into_rgb8).map_err(|e| format!("{}: {e}", path.display()))
+    // By its content: a wrong extension hides nothing.
+    let open = |path: &Path| -> Result<RgbImage, String> {
+        let named = |e: &dyn Error| format!("{}: {e}", path.display());
+        let reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format);
+        reader.map_err(|e| named(&e))?.decode().map(DynamicImage::into_rgb8).map_err(|e| named(&e))
     };
     Ok(Input {
         names: paths.map(|p| p.file_name().unwrap_or_default().to_string_lossy().into_owned()),
@@ -287,7 +262,8 @@ fn export(
     if arguments.ply.is_none() && arguments.colmap.is_none() {
         return Ok(());
     }
-    let points = scene_points(input, matches, found)?;
+    let camera = |i: usize| input.cameras[i].camera::<f64>();
+    let points = scene_points(&input.images[0], &[camera(0)?, camera(1)?], matches, found);
     if let Some(path) = &arguments.ply {
         write_ply(path, &points).map_err(|e| format!("{}: {e}", path.display()))?;
         println!("wrote {} points to {}", points.len(), path.display());
@@ -304,28 +280,4 @@ fn export(
         println!("wrote cameras.txt, images.txt, points3D.txt to {}", folder.display());
     }
     Ok(())
-}
-
-/// The points in front of both cameras, coloured as in image 1, with their reprojection errors.
-fn scene_points(
-    input: &Input,
-    matches: &[Match],
-    found: &TwoView,
-) -> Result<Vec<ScenePoint>, Box<dyn Error>> {
-    use epipole::geometry::CameraModel;
-    let cameras = [input.cameras[0].camera::<f64>()?, input.cameras[1].camera::<f64>()?];
-    let poses = [Isometry3::identity(), found.pose];
-    let points = found.points.iter().filter_map(|&(index, position)| {
-        let pixels = [matches[index].x1, matches[index].x2];
-        let mut error_px = 0.0;
-        for ((camera, pose), pixel) in cameras.iter().zip(&poses).zip(pixels) {
-            let seen = camera.project(&(pose * epipole::nalgebra::Point3::from(position)).coords)?;
-            error_px += (seen.x - pixel[0]).hypot(seen.y - pixel[1]) / 2.0;
-        }
-        let image = &input.images[0];
-        let at = |x: f64, side: u32| (x.round().max(0.0) as u32).min(side - 1);
-        let colour = image.get_pixel(at(pixels[0][0], image.width()), at(pixels[0][1], image.height())).0;
-        Some(ScenePoint { position, colour, pixels, error_px })
-    });
-    Ok(points.collect())
 }
