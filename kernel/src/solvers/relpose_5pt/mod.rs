@@ -8,7 +8,11 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::geometry::{Essential, Pose};
 use crate::linalg::null_space;
-use crate::linalg::poly::projective_roots_10;
+use crate::linalg::poly::real_roots_10;
+use crate::real::lit;
+const NEAR: f64 = 64.0;
+const STEPS: u32 = 3;
+const DUP: f64 = 64.0;
 use crate::{Real, Solutions};
 
 /// The essential matrices that five bearing pairs allow: up to ten, each of unit Frobenius norm.
@@ -94,18 +98,46 @@ fn solve<T: Real, W: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) -> Soluti
         ];
     }
     let Some(null) = null_space::<T, 5, 9, 4>(&rows) else { return solutions };
-    let basis: [[T; 4]; 9] = core::array::from_fn(|i| [null[0][i], null[1][i], null[2][i], null[3][i]]);
+    let basis: [[T; 4]; 9] = core::array::from_fn(|i| {
+        let n = [null[0][i], null[1][i], null[2][i], null[3][i]];
+        let h = T::HALF;
+        let (a, b, c, d) = ((n[0] + n[1]) * h, (n[0] - n[1]) * h, (n[2] + n[3]) * h, (n[2] - n[3]) * h);
+        [a + c, b + d, a - c, b - d]
+    });
     let Some(hidden) = hidden::eliminate(cubics::essential_cubics(&basis)) else { return solutions };
-    let roots = projective_roots_10(&hidden::determinant::<T, W>(&hidden));
-    for root in &roots {
-        let root = root.map(|v| <T as Real>::from_f64(v.to_f64()));
+    let near = <W as Real>::from_f64(NEAR * T::EPSILON.to_f64());
+    let [inside, outside] = real_roots_10(&hidden::determinant::<T, W>(&hidden), near);
+    let narrow = |v: &W| <T as Real>::from_f64(v.to_f64());
+    let inside = inside.as_slice().iter().map(|x| [narrow(x), T::ONE]);
+    let outside = outside.as_slice().iter().map(|x| [T::ONE, narrow(x)]);
+    let mut kept = [[T::ZERO; 4]; 10];
+    for root in inside.chain(outside) {
         let Some(mut c) = hidden::unknowns(&hidden, root) else { continue };
         let mut step_sq = T::MAX;
-        for _ in 0..2 {
+        for _ in 0..STEPS {
             (c, step_sq) = polish::newton_step(&basis, &c);
+            if step_sq <= T::EPSILON {
+                break;
+            }
         }
         if step_sq <= T::EPSILON {
+            let mut twice = false;
+            for k in kept.iter() {
+                let mut d = T::ZERO;
+                let mut e = T::ZERO;
+                for i in 0..4 {
+                    d += (k[i] - c[i]) * (k[i] - c[i]);
+                    e += (k[i] + c[i]) * (k[i] + c[i]);
+                }
+                twice |= d < lit::<T>(DUP) * T::EPSILON || e < lit::<T>(DUP) * T::EPSILON;
+            }
+            if twice {
+                continue;
+            }
             let e = polish::combine(&basis, &c);
+            if let Some(k) = kept.get_mut(solutions.len()) {
+                *k = c;
+            }
             solutions.push(Essential(Matrix3::new(e[0], e[1], e[2], e[3], e[4], e[5], e[6], e[7], e[8])));
         }
     }
