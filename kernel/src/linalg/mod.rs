@@ -8,6 +8,7 @@ use crate::real::{abs, is_finite, max};
 pub(crate) mod conic;
 mod cubic;
 mod eigen;
+pub(crate) mod four;
 mod lanes;
 mod ldlt;
 mod least_singular3;

@@ -7,12 +7,13 @@
 //! for on both sides of the extremum between them. Newton's iteration, kept inside its bracket, does the rest.
 
 use crate::Real;
+use crate::linalg::four::Four;
 use crate::real::{abs, lit, sqrt};
 
 /// Coefficients of a polynomial of degree 10.
 type Coefficients<T> = [T; 11];
 
-/// Most roots of one chart that are kept: a true polynomial has ten in both, candidates at extrema may be more.
+/// Most candidates of one chart: of true roots there are ten in both charts, candidates at extrema may be more.
 const CAPACITY: usize = 12;
 /// Halvings of a quarter after which two sign changes are taken for a close pair.
 const PAIR_DEPTH: u32 = 4;
@@ -21,28 +22,36 @@ const MAX_DEPTH: usize = 10;
 /// Newton steps at the most, for a root and for an extremum.
 const NEWTON: u32 = 12;
 
-/// Where a root stands on the projective line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Chart {
-    /// `x` itself, |x| <= 1.
-    Inside,
-    /// `1 / x`, |x| >= 1.
-    Outside,
-}
-
-/// The roots of one chart.
+/// Candidates for the roots in [-1, 1] of a polynomial of degree 10.
 #[derive(Clone, Debug)]
-pub struct Roots10<T> {
+pub struct RealRoots10<T> {
     roots: [T; CAPACITY],
     len: usize,
+    worst: LeastDetermined<T>,
 }
 
-impl<T: Real> Roots10<T> {
-    /// The roots.
+/// The root that an error of the coefficients moves the most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LeastDetermined<T> {
+    /// Where it is.
+    pub x: T,
+    /// How far the error moves it, to first order.
+    pub spread: T,
+}
+
+impl<T: Real> RealRoots10<T> {
+    /// The candidates.
     #[inline]
     #[must_use]
     pub fn as_slice(&self) -> &[T] {
         self.roots.get(..self.len).unwrap_or(&[])
+    }
+
+    /// The least determined candidate (of spread 0 where there is none).
+    #[inline]
+    #[must_use]
+    pub fn least_determined(&self) -> LeastDetermined<T> {
+        self.worst
     }
 }
 
@@ -59,6 +68,7 @@ struct Bracket<T> {
 struct Brackets<T> {
     list: [Bracket<T>; CAPACITY],
     len: usize,
+    worst: LeastDetermined<T>,
 }
 
 impl<T: Real> Brackets<T> {
@@ -71,44 +81,82 @@ impl<T: Real> Brackets<T> {
     }
 }
 
-/// The real roots, as those of |x| <= 1 and as the reciprocals of those of |x| > 1 (infinity is 0 there).
+impl<T: Real> LeastDetermined<T> {
+    #[inline]
+    fn see(&mut self, x: T, spread: T) {
+        if spread > self.spread {
+            *self = Self { x, spread };
+        }
+    }
+}
+
+/// The real roots of a polynomial of degree 10 in [-1, 1].
 ///
 /// # Input
-/// Coefficients from the constant term upwards. `near`: the polynomial is known no better than to this error, relative to the
-/// sum of the magnitudes of its coefficients; an extremum that comes as near to zero as that gives two
-/// candidates, the ends of the interval in which the parabola of the extremum stays below the error.
+/// Coefficients from the constant term upwards. `error`: how far they may be wrong, relative to the sum of their
+/// magnitudes.
 ///
 /// # Returns
-/// Simple roots to a few `EPSILON` of their condition.
+/// The roots, those above 0 first. An extremum within the error of zero counts as two candidates, one on either side,
+/// whether or not it crosses; so does a double root.
+///
+/// # Accuracy
+/// A few `EPSILON` times the root's condition.
 ///
 /// # Cost
-/// At most 2^10 halvings of 55 additions, 10 usual; 4 to 6 Newton steps a root usual, 12 at the most.
+/// At most 2^11 halvings of 55 additions, about 10 usual; 12 Newton steps a root at the most, 4 or 5 usual.
+///
+/// # References
+/// J. M. Lane and R. F. Riesenfeld, "Bounds on a polynomial", BIT, 1981, for sign changes in Bernstein's basis; halving at
+/// every step, as they do, is stopped here at a close pair, which its extremum tells apart.
+///
+/// # Examples
+/// ```
+/// use epipole::linalg::poly::real_roots_10;
+/// let mut c = [0.0_f64; 11]; // (x^2 - 1/4) (x^8 + 1)
+/// (c[0], c[2], c[8], c[10]) = (-0.25, 1.0, -0.25, 1.0);
+/// let roots = real_roots_10(&c, 1e-15);
+/// assert_eq!(roots.as_slice().len(), 2);
+/// assert!((roots.as_slice()[0] - 0.5).abs() < 1e-15 && (roots.as_slice()[1] + 0.5).abs() < 1e-15);
+/// ```
 #[inline]
-pub fn real_roots_10<T: Real>(c: &Coefficients<T>, near: T) -> [Roots10<T>; 2] {
+#[must_use]
+pub fn real_roots_10<T: Real>(c: &[T; 11], error: T) -> RealRoots10<T> {
+    roots_in_chart(c, error, None)
+}
+
+/// The real roots on the whole projective line: those in [-1, 1], and the reciprocals of the others (0 is the root at
+/// infinity). As [`real_roots_10`] otherwise.
+#[inline]
+#[must_use]
+pub fn projective_roots_10<T: Real>(c: &[T; 11], error: T) -> [RealRoots10<T>; 2] {
     let mut reversed = *c;
     reversed.reverse();
+    // Both charts must agree on the sign at 1 and -1, or a root there would be found twice or never.
+    let ends = [T::ONE, -T::ONE].map(|side| bernstein(c, side)[10]);
+    [roots_in_chart(c, error, Some(ends)), roots_in_chart(&reversed, error, Some(ends))]
+}
+
+#[inline(never)]
+fn roots_in_chart<T: Real>(c: &Coefficients<T>, error: T, ends: Option<[T; 2]>) -> RealRoots10<T> {
     let mut size = T::ZERO;
     for &v in c {
         size += abs(v);
     }
-    let mut ends = [T::ZERO; 2];
-    let mut inside = true;
-    [c, &reversed].map(|c| {
-        let none = Bracket { lo: T::ZERO, hi: T::ZERO, positive: false, guess: T::ZERO };
-        let mut brackets = Brackets { list: [none; CAPACITY], len: 0 };
-        for (side, end) in [T::ONE, -T::ONE].into_iter().zip(&mut ends) {
-            let mut b = bernstein(c, side);
-            // Both charts must agree on the sign at -1 and 1, or a root there would be found twice or never.
-            if inside {
-                *end = b[10];
-            } else {
-                b[10] = *end;
-            }
-            isolate(c, side, b, near * size, &mut brackets);
+    let error = error * size;
+    let none = Bracket { lo: T::ZERO, hi: T::ZERO, positive: false, guess: T::ZERO };
+    let worst = LeastDetermined { x: T::ZERO, spread: T::ZERO };
+    let mut brackets = Brackets { list: [none; CAPACITY], len: 0, worst };
+    let mut waiting = [(*c, T::ZERO, T::ONE); MAX_DEPTH + 1];
+    for k in 0..2 {
+        let side = if k == 0 { T::ONE } else { -T::ONE };
+        let mut b = bernstein(c, side);
+        if let Some(ends) = ends {
+            b[10] = ends[k];
         }
-        inside = false;
-        polish(c, &brackets)
-    })
+        isolate(c, side, b, error, &mut waiting, &mut brackets);
+    }
+    polish(c, &brackets, error)
 }
 
 /// Bernstein coefficients on [0, 1] of the polynomial in `t = side * x`.
@@ -166,53 +214,71 @@ fn sign_changes<T: Real>(b: &[T]) -> u32 {
     changes
 }
 
+/// Depth first; what waits is the right half of each level.
+type Waiting<T> = [(Coefficients<T>, T, T); MAX_DEPTH + 1];
+
 #[inline]
-fn isolate<T: Real>(c: &Coefficients<T>, side: T, b: Coefficients<T>, error: T, found: &mut Brackets<T>) {
-    // Depth first; what waits is the right half of each level.
-    let mut waiting = [(b, T::ZERO, T::ONE); MAX_DEPTH + 1];
-    let mut count = 1usize;
+fn isolate<T: Real>(
+    c: &Coefficients<T>,
+    side: T,
+    mut b: Coefficients<T>,
+    error: T,
+    waiting: &mut Waiting<T>,
+    found: &mut Brackets<T>,
+) {
+    let (mut lo, mut width) = (T::ZERO, T::ONE);
+    let mut count = 0usize;
     for _ in 0..1usize << (MAX_DEPTH + 1) {
-        let Some(next) = count.checked_sub(1) else { return };
-        let Some(&(b, lo, width)) = waiting.get(next) else { return };
-        count = next;
         let changes = sign_changes(&b);
-        if changes == 0 {
-            continue;
-        }
         let positive = b[0] >= T::ZERO;
         if changes == 1 {
-            // Where the control polygon crosses zero.
-            let mut at = T::HALF;
-            for i in 0..10 {
-                if (b[i] < T::ZERO) != (b[i + 1] < T::ZERO) {
-                    at = (lit::<T>(i as f64) + b[i] / (b[i] - b[i + 1])) * lit(0.1);
-                }
-            }
-            found.push(oriented(side, lo, lo + width, positive, lo + width * at));
-            continue;
-        }
-        let narrow = width <= lit(1.0 / (1 << PAIR_DEPTH) as f64);
-        let last = width <= lit(1.0 / (1 << MAX_DEPTH) as f64);
-        let slopes: [T; 10] = core::array::from_fn(|i| b[i + 1] - b[i]);
-        if last || narrow && changes == 2 && sign_changes(&slopes) == 1 {
-            if changes % 2 == 1 {
+            let guess = lo + width * polygon_zero(&b);
+            found.push(oriented(side, lo, lo + width, positive, guess));
+        } else if changes > 1 {
+            let narrow = width <= lit(1.0 / (1 << PAIR_DEPTH) as f64);
+            if width <= lit(1.0 / (1 << MAX_DEPTH) as f64) && changes % 2 == 1 {
                 found.push(oriented(side, lo, lo + width, positive, lo + width * T::HALF));
-            } else {
+            } else if narrow
+                && changes % 2 == 0
+                && (width <= lit(1.0 / (1 << MAX_DEPTH) as f64) || changes == 2 && one_extremum(&b))
+            {
                 pair(c, side, lo, lo + width, positive, error, found);
+            } else {
+                let [left, right] = halves(&b);
+                width *= T::HALF;
+                if let Some(slot) = waiting.get_mut(count) {
+                    *slot = (right, lo + width, width);
+                    count += 1;
+                }
+                b = left;
+                continue;
             }
-            continue;
         }
-        let [left, right] = halves(&b);
-        let half = width * T::HALF;
-        if let Some(slot) = waiting.get_mut(count) {
-            *slot = (right, lo + half, half);
-            count += 1;
-        }
-        if let Some(slot) = waiting.get_mut(count) {
-            *slot = (left, lo, half);
-            count += 1;
+        let Some(next) = count.checked_sub(1) else { return };
+        let Some(slot) = waiting.get(next) else { return };
+        count = next;
+        (b, lo, width) = *slot;
+    }
+}
+
+/// Whether the slopes of the control polygon change sign once.
+#[inline]
+fn one_extremum<T: Real>(b: &Coefficients<T>) -> bool {
+    let slopes: [T; 10] = core::array::from_fn(|i| b[i + 1] - b[i]);
+    sign_changes(&slopes) == 1
+}
+
+/// Where the control polygon with one sign change crosses zero, in [0, 1].
+#[inline]
+fn polygon_zero<T: Real>(b: &Coefficients<T>) -> T {
+    let (mut u, mut v, mut at) = (b[0], b[1], T::ZERO);
+    for i in 1..10 {
+        // The pair whose first member still has the sign of b[0] and whose second has not: the last such first member.
+        if (b[i] < T::ZERO) == (b[0] < T::ZERO) {
+            (u, v, at) = (b[i], b[i + 1], lit(i as f64));
         }
     }
+    (at + u / (u - v)) * lit(0.1)
 }
 
 /// The bracket in `x = side * t`.
@@ -265,6 +331,9 @@ fn pair<T: Real>(
         }
     }
     let reach = sqrt(abs(f / h));
+    if abs(f) <= lit::<T>(16.0) * error {
+        found.worst.see(x, reach + sqrt(abs(error / h)));
+    }
     if (f >= T::ZERO) != positive {
         found.push(Bracket { lo, hi: x, positive, guess: x - reach });
         found.push(Bracket { lo: x, hi, positive: !positive, guess: x + reach });
@@ -288,40 +357,35 @@ fn value_and_derivatives<T: Real>(c: &Coefficients<T>, x: T) -> (T, T, T) {
     (f, d, h)
 }
 
-const LANES: usize = 4;
-
 /// Newton's iteration, four roots side by side, halving a bracket wherever Newton leaves it.
 #[inline]
-fn polish<T: Real>(c: &Coefficients<T>, brackets: &Brackets<T>) -> Roots10<T> {
-    let mut roots = [T::ZERO; CAPACITY];
-    for (out, group) in roots
-        .chunks_exact_mut(LANES)
-        .zip(brackets.list.chunks_exact(LANES))
-        .take(brackets.len.div_ceil(LANES))
-    {
+fn polish<T: Real>(c: &Coefficients<T>, brackets: &Brackets<T>, error: T) -> RealRoots10<T> {
+    let (mut roots, mut worst) = ([T::ZERO; CAPACITY], brackets.worst);
+    let groups = roots.chunks_exact_mut(4).zip(brackets.list.chunks_exact(4));
+    let mut left = brackets.len;
+    for (out, group) in groups.take(brackets.len.div_ceil(4)) {
         let &[g0, g1, g2, g3] = group else { continue };
         let group = [g0, g1, g2, g3];
         let (mut lo, mut hi) = (group.map(|g| g.lo), group.map(|g| g.hi));
         let positive = group.map(|g| g.positive);
         let mut x = group.map(|g| g.guess);
+        let mut slope = [T::ONE; 4];
         for _ in 0..NEWTON {
-            let (mut f, mut d) = ([c[10]; LANES], [T::ZERO; LANES]);
+            let at = Four(x);
+            let (mut f, mut d) = (Four::splat(c[10]), Four::splat(T::ZERO));
             for i in (0..10).rev() {
-                for k in 0..LANES {
-                    d[k] = d[k] * x[k] + f[k];
-                }
-                for k in 0..LANES {
-                    f[k] = f[k] * x[k] + c[i];
-                }
+                d = d * at + f;
+                f = f * at + Four::splat(c[i]);
             }
+            let newton = (at - f / d).0;
+            slope = d.0;
             let mut moved = T::ZERO;
-            for k in 0..LANES {
-                let left = (f[k] >= T::ZERO) == positive[k];
-                lo[k] = if left { x[k] } else { lo[k] };
-                hi[k] = if left { hi[k] } else { x[k] };
-                let newton = x[k] - f[k] / d[k];
-                let inside = newton >= lo[k] && newton <= hi[k];
-                let next = if inside { newton } else { (lo[k] + hi[k]) * T::HALF };
+            for k in 0..4 {
+                let before = (f.0[k] >= T::ZERO) == positive[k];
+                lo[k] = if before { x[k] } else { lo[k] };
+                hi[k] = if before { hi[k] } else { x[k] };
+                let inside = newton[k] >= lo[k] && newton[k] <= hi[k];
+                let next = if inside { newton[k] } else { (lo[k] + hi[k]) * T::HALF };
                 let step = abs(next - x[k]);
                 moved = if step > moved { step } else { moved };
                 x[k] = next;
@@ -331,9 +395,11 @@ fn polish<T: Real>(c: &Coefficients<T>, brackets: &Brackets<T>) -> Roots10<T> {
                 break;
             }
         }
-        for (slot, x) in out.iter_mut().zip(x) {
+        for ((slot, x), d) in out.iter_mut().zip(x).zip(slope).take(left) {
             *slot = x;
+            worst.see(x, error / abs(d));
         }
+        left = left.saturating_sub(4);
     }
-    Roots10 { roots, len: brackets.len }
+    RealRoots10 { roots, len: brackets.len, worst }
 }

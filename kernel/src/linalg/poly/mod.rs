@@ -2,4 +2,4 @@
 
 mod degree_10;
 
-pub use degree_10::{Chart, Roots10, real_roots_10};
+pub use degree_10::{LeastDetermined, RealRoots10, projective_roots_10, real_roots_10};

@@ -2,7 +2,9 @@
 //! polynomial of degree 10 that is their determinant.
 
 use super::cubics::Cubic;
+use super::polish::{cross, norm_sq, select};
 use crate::Real;
+use crate::linalg::four::Four;
 use crate::real::{abs, sqrt};
 
 /// `x * row.x(z) + y * row.y(z) + row.one(z) = 0`, coefficients from z^0 upwards.
@@ -62,6 +64,30 @@ pub(super) fn eliminate<T: Real>(mut m: [Cubic<T>; 10]) -> Option<[HiddenRow<T>;
 }
 
 impl<T: Real> HiddenRow<T> {
+    /// The row in 1 / z.
+    pub(super) fn reversed(mut self) -> Self {
+        self.x.reverse();
+        self.y.reverse();
+        self.one.reverse();
+        self
+    }
+
+    /// The row in z - s (Horner's scheme, repeated).
+    pub(super) fn shifted(mut self, s: T) -> Self {
+        for level in 0..3 {
+            for i in (level..3).rev() {
+                self.x[i] += s * self.x[i + 1];
+                self.y[i] += s * self.y[i + 1];
+            }
+        }
+        for level in 0..4 {
+            for i in (level..4).rev() {
+                self.one[i] += s * self.one[i + 1];
+            }
+        }
+        self
+    }
+
     fn dot(&self, other: &Self) -> T {
         let mut sum = T::ZERO;
         for i in 0..4 {
@@ -131,35 +157,32 @@ pub(super) fn determinant<T: Real, W: Real>(rows: &[HiddenRow<T>; 3]) -> [W; 11]
     det
 }
 
-/// The null vector (x, y, 1) of the rows at z = `num` / `den`, homogeneous: coefficients of the four basis matrices.
-#[inline]
-pub(super) fn unknowns<T: Real>(rows: &[HiddenRow<T>; 3], [num, den]: [T; 2]) -> Option<[T; 4]> {
-    // Homogeneous Horner: the larger of |num|, |den| is 1.
-    let cubic = |p: &[T; 4]| {
-        let (n2, d2) = (num * num, den * den);
-        (p[0] * den + p[1] * num) * d2 + (p[2] * den + p[3] * num) * n2
-    };
-    let quartic = |p: &[T; 5]| {
-        let (n2, d2) = (num * num, den * den);
-        (p[0] * d2 + p[1] * num * den) * d2 + (p[2] * d2 + p[3] * num * den + p[4] * n2) * n2
-    };
-    let b = rows.map(|r| [cubic(&r.x), cubic(&r.y), quartic(&r.one)]);
-    let cross = |u: &[T; 3], v: &[T; 3]| {
-        [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
-    };
-    let norm_sq = |v: &[T; 3]| v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-    let mut best = cross(&b[0], &b[1]);
-    for other in [cross(&b[1], &b[2]), cross(&b[2], &b[0])] {
-        if norm_sq(&other) > norm_sq(&best) {
-            best = other;
-        }
+/// The null vectors (x, y, 1) of the rows at z = `num` / `den`, homogeneous: unit vectors of the coefficients of the four
+/// basis matrices. The larger of |num|, |den| is near 1.
+#[inline(always)]
+pub(super) fn unknowns<T: Real>(rows: &[HiddenRow<T>; 3], num: Four<T>, den: Four<T>) -> [Four<T>; 4] {
+    let (n2, nd, d2) = (num * num, num * den, den * den);
+    let cubics = [d2 * den, d2 * num, n2 * den, n2 * num];
+    let quartics = [d2 * d2, d2 * nd, n2 * d2, n2 * nd, n2 * n2];
+    let b = rows.map(|r| {
+        let cubic = |p: &[T; 4]| {
+            (cubics[0].times(p[0]) + cubics[1].times(p[1])) + (cubics[2].times(p[2]) + cubics[3].times(p[3]))
+        };
+        let p = r.one;
+        let low = quartics[0].times(p[0]) + quartics[1].times(p[1]);
+        let high = quartics[3].times(p[3]) + quartics[4].times(p[4]);
+        [cubic(&r.x), cubic(&r.y), low + quartics[2].times(p[2]) + high]
+    });
+    let [mut best, second, third] = [cross(&b[0], &b[1]), cross(&b[1], &b[2]), cross(&b[2], &b[0])];
+    let mut largest = norm_sq(&best);
+    for other in [second, third] {
+        let size = norm_sq(&other);
+        let mask = size.greater(largest);
+        largest = Four::select(mask, size, largest);
+        best = select(mask, &other, &best);
     }
     // x and y come divided by the scale of the homogeneous z.
     let c = [best[0], best[1], best[2] * num, best[2] * den];
-    let n = c[0] * c[0] + c[1] * c[1] + c[2] * c[2] + c[3] * c[3];
-    if !(n > T::ZERO) {
-        return None;
-    }
-    let inverse = T::ONE / sqrt(n);
-    Some(c.map(|v| v * inverse))
+    let s = Four::splat(T::ONE) / (c[0] * c[0] + c[1] * c[1] + (c[2] * c[2] + c[3] * c[3])).sqrt();
+    c.map(|v| v * s)
 }

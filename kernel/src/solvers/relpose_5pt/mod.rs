@@ -6,14 +6,23 @@ mod polish;
 
 use nalgebra::{Matrix3, Vector3};
 
+use self::cubics::essential_cubics;
+use self::hidden::{determinant, unknowns};
 use crate::geometry::{Essential, Pose};
+use crate::linalg::four::Four;
 use crate::linalg::null_space;
-use crate::linalg::poly::real_roots_10;
-use crate::real::lit;
-const NEAR: f64 = 64.0;
-const STEPS: u32 = 3;
-const DUP: f64 = 64.0;
+use crate::linalg::poly::{projective_roots_10, real_roots_10};
+use crate::real::{abs, lit, min};
 use crate::{Real, Solutions};
+
+/// Error of the polynomial's coefficients relative to the sum of their magnitudes, in `EPSILON`.
+const POLYNOMIAL_ERROR: f64 = 4.0;
+/// A root that this error may move farther is looked for again with the polynomial expanded about it.
+const SPREAD: f64 = 0.02;
+/// Newton steps at the most; a root that is well determined takes one.
+const STEPS: u32 = 8;
+/// Two unit vectors whose cosine is within this many `EPSILON` of 1 are the same solution.
+const SAME: f64 = 32.0;
 
 /// The essential matrices that five bearing pairs allow: up to ten, each of unit Frobenius norm.
 ///
@@ -82,7 +91,7 @@ pub fn relpose_5pt_poses<T: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) ->
 
 #[inline]
 fn solve<T: Real, W: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) -> Solutions<Essential<T>, 10> {
-    let mut solutions = Solutions::new();
+    let mut found = Found { coefficients: [[T::ZERO; 4]; 10], len: 0 };
     let mut rows = [[T::ZERO; 9]; 5];
     for ((row, a), b) in rows.iter_mut().zip(x1).zip(x2) {
         *row = [
@@ -97,49 +106,126 @@ fn solve<T: Real, W: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) -> Soluti
             b.z * a.z,
         ];
     }
-    let Some(null) = null_space::<T, 5, 9, 4>(&rows) else { return solutions };
-    let basis: [[T; 4]; 9] = core::array::from_fn(|i| {
-        let n = [null[0][i], null[1][i], null[2][i], null[3][i]];
-        let h = T::HALF;
-        let (a, b, c, d) = ((n[0] + n[1]) * h, (n[0] - n[1]) * h, (n[2] + n[3]) * h, (n[2] - n[3]) * h);
-        [a + c, b + d, a - c, b - d]
-    });
-    let Some(hidden) = hidden::eliminate(cubics::essential_cubics(&basis)) else { return solutions };
-    let near = <W as Real>::from_f64(NEAR * T::EPSILON.to_f64());
-    let [inside, outside] = real_roots_10(&hidden::determinant::<T, W>(&hidden), near);
-    let narrow = |v: &W| <T as Real>::from_f64(v.to_f64());
-    let inside = inside.as_slice().iter().map(|x| [narrow(x), T::ONE]);
-    let outside = outside.as_slice().iter().map(|x| [T::ONE, narrow(x)]);
-    let mut kept = [[T::ZERO; 4]; 10];
-    for root in inside.chain(outside) {
-        let Some(mut c) = hidden::unknowns(&hidden, root) else { continue };
-        let mut step_sq = T::MAX;
-        for _ in 0..STEPS {
-            (c, step_sq) = polish::newton_step(&basis, &c);
-            if step_sq <= T::EPSILON {
-                break;
-            }
+    let Some(null) = null_space::<T, 5, 9, 4>(&rows) else { return Solutions::new() };
+    let basis: [[T; 4]; 9] = core::array::from_fn(|i| [null[0][i], null[1][i], null[2][i], null[3][i]]);
+    let Some(rows) = hidden::eliminate(essential_cubics(&basis)) else { return Solutions::new() };
+
+    let error = lit::<W>(POLYNOMIAL_ERROR) * lit(T::EPSILON.to_f64());
+    let narrow = |v: W| lit::<T>(v.to_f64());
+    let [inside, outside] = projective_roots_10(&determinant::<T, W>(&rows), error);
+    let mut candidates = Candidates::new();
+    inside.as_slice().iter().for_each(|&x| candidates.push(narrow(x), T::ONE));
+    outside.as_slice().iter().for_each(|&x| candidates.push(T::ONE, narrow(x)));
+    found.add(&basis, &candidates, |num, den| unknowns(&rows, num, den));
+
+    // Where roots crowd, the coefficients do not tell them apart: there the polynomial is expanded anew.
+    let (a, b) = (inside.least_determined(), outside.least_determined());
+    let (turned, centre) = if b.spread > a.spread { (true, b) } else { (false, a) };
+    if centre.spread > lit(SPREAD) {
+        let shift = narrow(centre.x);
+        let near = rows.map(|r| if turned { r.reversed() } else { r }.shifted(shift));
+        let radius = min(lit::<W>(4.0) * centre.spread, W::ONE);
+        let mut det = determinant::<T, W>(&near);
+        let mut power = W::ONE;
+        for c in &mut det {
+            *c *= power;
+            power *= radius;
         }
-        if step_sq <= T::EPSILON {
-            let mut twice = false;
-            for k in kept.iter() {
-                let mut d = T::ZERO;
-                let mut e = T::ZERO;
-                for i in 0..4 {
-                    d += (k[i] - c[i]) * (k[i] - c[i]);
-                    e += (k[i] + c[i]) * (k[i] + c[i]);
-                }
-                twice |= d < lit::<T>(DUP) * T::EPSILON || e < lit::<T>(DUP) * T::EPSILON;
-            }
-            if twice {
-                continue;
-            }
-            let e = polish::combine(&basis, &c);
-            if let Some(k) = kept.get_mut(solutions.len()) {
-                *k = c;
-            }
-            solutions.push(Essential(Matrix3::new(e[0], e[1], e[2], e[3], e[4], e[5], e[6], e[7], e[8])));
-        }
+        let mut candidates = Candidates::new();
+        real_roots_10(&det, error)
+            .as_slice()
+            .iter()
+            .for_each(|&x| candidates.push(narrow(x * radius), T::ONE));
+        found.add(&basis, &candidates, |num, den| {
+            let [x, y, z, w] = unknowns(&near, num, den);
+            let z = z + w.times(shift);
+            if turned { [x, y, w, z] } else { [x, y, z, w] }
+        });
+    }
+
+    let mut solutions = Solutions::new();
+    for c in found.coefficients.iter().take(found.len) {
+        let e: [T; 9] = core::array::from_fn(|i| {
+            let b = &basis[i];
+            (b[0] * c[0] + b[1] * c[1]) + (b[2] * c[2] + b[3] * c[3])
+        });
+        solutions.push(Essential(Matrix3::new(e[0], e[1], e[2], e[3], e[4], e[5], e[6], e[7], e[8])));
     }
     solutions
+}
+
+/// Roots of the polynomial as pairs of numerators and denominators, in groups of four.
+struct Candidates<T> {
+    groups: [[Four<T>; 2]; 6],
+    len: usize,
+}
+
+impl<T: Real> Candidates<T> {
+    #[inline]
+    fn new() -> Self {
+        // Unused lanes repeat z = 0.
+        Self { groups: [[Four::splat(T::ZERO), Four::splat(T::ONE)]; 6], len: 0 }
+    }
+
+    #[inline]
+    fn push(&mut self, num: T, den: T) {
+        if let Some([n, d]) = self.groups.get_mut(self.len / 4) {
+            (n.0[self.len % 4], d.0[self.len % 4]) = (num, den);
+            self.len += 1;
+        }
+    }
+}
+
+/// Solutions, as unit vectors of the coefficients of the four basis matrices.
+struct Found<T> {
+    coefficients: [[T; 4]; 10],
+    len: usize,
+}
+
+impl<T: Real> Found<T> {
+    /// Newton from each candidate; keeps those that arrive at an essential matrix not found before.
+    #[inline]
+    fn add(
+        &mut self,
+        basis: &[[T; 4]; 9],
+        candidates: &Candidates<T>,
+        start: impl Fn(Four<T>, Four<T>) -> [Four<T>; 4],
+    ) {
+        let mut left = candidates.len;
+        for &[num, den] in candidates.groups.iter().take(candidates.len.div_ceil(4)) {
+            let mut c = start(num, den);
+            let mut arrived = [false; 4];
+            let threshold = Four::splat(T::EPSILON);
+            for _ in 0..STEPS {
+                let (next, step_sq) = polish::newton_step(basis, &c);
+                c = core::array::from_fn(|k| Four::select(arrived, c[k], next[k]));
+                let small = threshold.greater(step_sq);
+                arrived = core::array::from_fn(|k| arrived[k] | small[k] | (k >= left));
+                if arrived == [true; 4] {
+                    break;
+                }
+            }
+            for k in 0..4 {
+                if k < left && arrived[k] {
+                    self.keep([c[0].0[k], c[1].0[k], c[2].0[k], c[3].0[k]]);
+                }
+            }
+            left = left.saturating_sub(4);
+        }
+    }
+
+    #[inline]
+    fn keep(&mut self, c: [T; 4]) {
+        let one = T::ONE - lit::<T>(SAME) * T::EPSILON;
+        for k in self.coefficients.iter().take(self.len) {
+            let cos = (k[0] * c[0] + k[1] * c[1]) + (k[2] * c[2] + k[3] * c[3]);
+            if abs(cos) > one {
+                return;
+            }
+        }
+        if let Some(slot) = self.coefficients.get_mut(self.len) {
+            *slot = c;
+            self.len += 1;
+        }
+    }
 }

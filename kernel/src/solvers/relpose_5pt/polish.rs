@@ -1,66 +1,76 @@
-//! A Newton step from a matrix of the null space to the essential matrices.
+//! Newton steps from matrices of the null space to the essential matrices, four side by side.
 //!
 //! At `E = s (u1 v1' + u2 v2')` the matrices normal to the essential matrices are spanned by `u1 v1' - u2 v2'`,
 //! `u1 v2' + u2 v1'` and `u3 v3'`. A combination `c` of the four basis matrices that is orthogonal to these three is
 //! the null vector of a 3x4 matrix: that is the whole step, and it converges quadratically.
 
 use crate::Real;
-use crate::real::sqrt;
+use crate::linalg::four::Four;
 
-type V3<T> = [T; 3];
+pub(super) type V3<T> = [Four<T>; 3];
 
 #[inline(always)]
-fn cross<T: Real>(u: &V3<T>, v: &V3<T>) -> V3<T> {
+pub(super) fn cross<T: Real>(u: &V3<T>, v: &V3<T>) -> V3<T> {
     [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
 }
 
 #[inline(always)]
-fn norm_sq<T: Real>(v: &V3<T>) -> T {
+pub(super) fn norm_sq<T: Real>(v: &V3<T>) -> Four<T> {
     v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
 }
 
 #[inline(always)]
 fn unit<T: Real>(v: &V3<T>) -> V3<T> {
-    let s = T::ONE / sqrt(norm_sq(v));
+    let s = Four::splat(T::ONE) / norm_sq(v).sqrt();
     [v[0] * s, v[1] * s, v[2] * s]
 }
 
-/// The combination of basis matrices; elements row by row.
 #[inline(always)]
-pub(super) fn combine<T: Real>(basis: &[[T; 4]; 9], c: &[T; 4]) -> [T; 9] {
-    core::array::from_fn(|i| {
-        basis[i][0] * c[0] + basis[i][1] * c[1] + basis[i][2] * c[2] + basis[i][3] * c[3]
-    })
+pub(super) fn select<T: Real, const N: usize>(
+    mask: [bool; 4],
+    a: &[Four<T>; N],
+    b: &[Four<T>; N],
+) -> [Four<T>; N] {
+    core::array::from_fn(|i| Four::select(mask, a[i], b[i]))
 }
 
-/// One step from the unit vector `c`: the next unit vector, and the squared length of the step.
+/// One step from the unit vectors `c`: the next unit vectors, and the squared lengths of the steps.
 #[inline]
-pub(super) fn newton_step<T: Real>(basis: &[[T; 4]; 9], c: &[T; 4]) -> ([T; 4], T) {
-    let e = combine(basis, c);
-    let column = |j: usize| [e[j], e[3 + j], e[6 + j]];
-    // Left null vector: the largest product of two columns; u1 lies along one of the two.
-    let mut u1 = column(0);
-    let mut u3 = cross(&column(0), &column(1));
-    for (a, b) in [(1, 2), (2, 0)] {
-        let other = cross(&column(a), &column(b));
-        if norm_sq(&other) > norm_sq(&u3) {
-            (u1, u3) = (column(a), other);
-        }
+pub(super) fn newton_step<T: Real>(basis: &[[T; 4]; 9], c: &[Four<T>; 4]) -> ([Four<T>; 4], Four<T>) {
+    let e: [Four<T>; 9] = core::array::from_fn(|i| {
+        let [b0, b1, b2, b3] = basis[i];
+        (c[0].times(b0) + c[1].times(b1)) + (c[2].times(b2) + c[3].times(b3))
+    });
+    let columns = [[e[0], e[3], e[6]], [e[1], e[4], e[7]], [e[2], e[5], e[8]]];
+    // u1 along the largest column; the left null vector from it and the better of the others.
+    let [mut first, mut second, mut third] = columns;
+    let mut largest = norm_sq(&first);
+    for (a, b, d) in [(1, 2, 0), (2, 0, 1)] {
+        let size = norm_sq(&columns[a]);
+        let mask = size.greater(largest);
+        largest = Four::select(mask, size, largest);
+        first = select(mask, &columns[a], &first);
+        second = select(mask, &columns[b], &second);
+        third = select(mask, &columns[d], &third);
     }
-    let (u1, u3) = (unit(&u1), unit(&u3));
+    let s = Four::splat(T::ONE) / largest.sqrt();
+    let u1 = first.map(|v| v * s);
+    let (p, q) = (cross(&u1, &second), cross(&u1, &third));
+    let u3 = unit(&select(norm_sq(&p).greater(norm_sq(&q)), &p, &q));
     let u2 = cross(&u3, &u1);
-    let transposed =
-        |u: &V3<T>| -> V3<T> { core::array::from_fn(|j| e[j] * u[0] + e[3 + j] * u[1] + e[6 + j] * u[2]) };
+    let transposed = |u: &V3<T>| -> V3<T> {
+        core::array::from_fn(|j| columns[j][0] * u[0] + columns[j][1] * u[1] + columns[j][2] * u[2])
+    };
     let v1 = unit(&transposed(&u1));
     let v3 = unit(&cross(&v1, &transposed(&u2)));
     let v2 = cross(&v3, &v1);
-    let mut a = [[T::ZERO; 4]; 3];
+    let mut a = [[Four::splat(T::ZERO); 4]; 3];
     for i in 0..3 {
         for j in 0..3 {
             let normal = [u1[i] * v1[j] - u2[i] * v2[j], u1[i] * v2[j] + u2[i] * v1[j], u3[i] * v3[j]];
-            for r in 0..3 {
-                for k in 0..4 {
-                    a[r][k] += normal[r] * basis[3 * i + j][k];
+            for (row, n) in a.iter_mut().zip(normal) {
+                for (sum, &b) in row.iter_mut().zip(&basis[3 * i + j]) {
+                    *sum = *sum + n.times(b);
                 }
             }
         }
@@ -75,14 +85,11 @@ pub(super) fn newton_step<T: Real>(basis: &[[T; 4]; 9], c: &[T; 4]) -> ([T; 4], 
         m01 * r[3] - m03 * r[1] + m13 * r[0],
         m02 * r[1] - m01 * r[2] - m12 * r[0],
     ];
-    let along = n[0] * c[0] + n[1] * c[1] + n[2] * c[2] + n[3] * c[3];
-    let length_sq = n[0] * n[0] + n[1] * n[1] + n[2] * n[2] + n[3] * n[3];
-    let s = T::ONE / sqrt(length_sq);
-    let s = if along < T::ZERO { -s } else { s };
+    let along = n[0] * c[0] + n[1] * c[1] + (n[2] * c[2] + n[3] * c[3]);
+    let length = (n[0] * n[0] + n[1] * n[1] + (n[2] * n[2] + n[3] * n[3])).sqrt();
+    let s = Four::splat(T::ONE) / length;
+    let s = Four::select(Four::splat(T::ZERO).greater(along), -s, s);
     let next = n.map(|v| v * s);
-    let mut step_sq = T::ZERO;
-    for k in 0..4 {
-        step_sq += (next[k] - c[k]) * (next[k] - c[k]);
-    }
-    (next, step_sq)
+    let d: [Four<T>; 4] = core::array::from_fn(|k| next[k] - c[k]);
+    (next, d[0] * d[0] + d[1] * d[1] + (d[2] * d[2] + d[3] * d[3]))
 }
