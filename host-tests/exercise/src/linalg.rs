@@ -75,9 +75,9 @@ pub(crate) fn svd3<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
 }
 
 pub(crate) fn polynomials<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
-    let roots = linalg::poly::projective_roots_10(&source.array::<T, 11>());
+    let roots = linalg::poly::projective_roots_10(&source.array::<T, 11>(), T::EPSILON);
     sink.count(roots.len());
-    sink.numbers(roots.iter().flatten());
+    sink.numbers(roots.iter().flat_map(|chart| chart.as_slice()));
     let roots = linalg::cubic_roots(&source.array::<T, 4>());
     sink.count(roots.len());
     sink.finite(roots.iter());

@@ -236,10 +236,10 @@ fn isolate<T: Real>(
             found.push(oriented(side, lo, lo + width, positive, guess));
         } else if changes > 1 {
             let narrow = width <= lit(1.0 / (1 << PAIR_DEPTH) as f64);
-            if width <= lit(1.0 / (1 << MAX_DEPTH) as f64) && changes % 2 == 1 {
+            if width <= lit(1.0 / (1 << MAX_DEPTH) as f64) && changes & 1 == 1 {
                 found.push(oriented(side, lo, lo + width, positive, lo + width * T::HALF));
             } else if narrow
-                && changes % 2 == 0
+                && changes & 1 == 0
                 && (width <= lit(1.0 / (1 << MAX_DEPTH) as f64) || changes == 2 && one_extremum(&b))
             {
                 pair(c, side, lo, lo + width, positive, error, found);
