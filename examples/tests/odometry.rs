@@ -32,7 +32,8 @@ fn a_rendered_sequence() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("odometry");
     let _ = fs::remove_dir_all(&folder);
     write_sequence(&folder);
-    let output = odometry(&folder, &[".", "--matches", "matches", "--out", "track.png"]);
+    let output =
+        odometry(&folder, &[".", "--features", "1500", "--matches", "matches", "--out", "track.png"]);
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let last = text.lines().last().unwrap();
@@ -53,7 +54,7 @@ fn a_rendered_sequence() {
 
     // Without the truth: a path in baselines, and no errors.
     fs::remove_file(folder.join("poses.txt")).unwrap();
-    let output = odometry(&folder, &[".", "--frames", "2", "--f32"]);
+    let output = odometry(&folder, &[".", "--frames", "2", "--f32", "--features", "1500"]);
     assert!(output.status.success());
     assert!(!String::from_utf8(output.stdout).unwrap().contains("median"));
 

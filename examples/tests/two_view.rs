@@ -104,11 +104,11 @@ fn built_in_scene_in_both_scalars_with_every_output() {
     let views = folder.join("views");
     let line = fs::read_to_string(views.join("arguments.txt")).unwrap();
     let mut arguments: Vec<&str> = line.split_whitespace().collect();
-    arguments.extend(["--f32", "--json", "b.json", "--out", "b.jpg"]);
+    arguments.extend(["--f32", "--features", "2000", "--json", "b.json", "--out", "b.jpg"]);
     assert_success(&two_view(&views, &arguments));
     let single = json(&views.join("b.json"));
     assert_accurate(&single);
-    assert_eq!(single["matches"], result["matches"]);
+    assert!(single["matches"].as_u64() < result["matches"].as_u64());
     assert!(views.join("b.jpg").exists());
 
     // A lens without distortion is a pinhole, whatever its model is called.
