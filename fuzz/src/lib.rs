@@ -91,7 +91,7 @@ mod tests {
 
     #[test]
     fn every_group_runs_on_any_bytes() {
-        for group in ["linalg", "geometry", "solvers"] {
+        for group in ["linalg", "geometry", "solvers", "robust", "bundle", "estimate"] {
             run(group, &[]);
             for choice in 0..=255 {
                 run(group, &[choice]);

@@ -1,5 +1,6 @@
 //! `epipole::geometry`.
 
+use epipole::geometry::cheirality::in_front_of_both;
 use epipole::geometry::triangulation::{
     Triangulation, View, ViewPair, depth_sigma, point_covariance, refine_point, triangulate_dlt,
 };
@@ -114,19 +115,19 @@ pub(crate) fn kannala_brandt<T: Real>(source: &mut Source<'_>, sink: &mut Sink) 
     model(&camera, source, sink);
 }
 
+/// One of the camera models.
+pub(crate) fn any_camera_model<T: Real>(source: &mut Source<'_>) -> Option<Camera<T>> {
+    let pinhole = camera::<T>(source)?;
+    let scale = lit::<T>(0.1);
+    match source.below(3) {
+        0 => Some(pinhole.into()),
+        1 => Some(BrownConrady::new(pinhole, source.array::<T, 5>().map(|k| k * scale)).ok()?.into()),
+        _ => Some(KannalaBrandt::new(pinhole, source.array::<T, 4>().map(|k| k * scale)).ok()?.into()),
+    }
+}
+
 pub(crate) fn any_camera<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
-    let Some(pinhole) = camera::<T>(source) else { return };
-    let camera = match source.below(3) {
-        0 => Camera::from(pinhole),
-        1 => match BrownConrady::new(pinhole, source.array()) {
-            Ok(camera) => camera.into(),
-            Err(_) => return,
-        },
-        _ => match KannalaBrandt::new(pinhole, source.array()) {
-            Ok(camera) => camera.into(),
-            Err(_) => return,
-        },
-    };
+    let Some(camera) = any_camera_model::<T>(source) else { return };
     sink.number(camera.pinhole().fx());
     model(&camera, source, sink);
 }
@@ -261,4 +262,37 @@ pub(crate) fn fundamental<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
     if let Some(nearest) = f.nearest() {
         sink.finite(&nearest.0);
     }
+}
+
+pub(crate) fn essential<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
+    let e = match source.below(3) {
+        0 => Essential(source.matrix::<T, 3, 3>()),
+        _ => Essential::from_pose(&source.pose()),
+    };
+    let (k1, k2) = (source.matrix::<T, 3, 3>(), source.matrix::<T, 3, 3>());
+    if let Some(f) = e.to_fundamental(&k1, &k2) {
+        sink.numbers(&Essential::from_fundamental(&f, &k1, &k2).0);
+    }
+    let nearest = e.nearest();
+    sink.flag(nearest.is_some());
+    if let Some(nearest) = nearest {
+        sink.finite(&nearest.0);
+    }
+    for pose in e.poses().iter().flatten() {
+        sink.finite_pose(pose);
+    }
+    let (x1, x2) = (source.vectors::<T, 4>(), source.vectors::<T, 4>());
+    if let Some(chosen) = e.pose_by_cheirality(&x1, &x2) {
+        sink.finite_pose(&chosen.pose);
+        sink.count(chosen.in_front);
+        sink.count(chosen.runner_up);
+    }
+    if let Some(pair) = e.twisted_pair() {
+        let pose = pair.pose_with_all_in_front(&x1, &x2);
+        sink.flag(pose.is_some());
+        if let Some(pose) = pose {
+            sink.finite_pose(&pose);
+        }
+    }
+    sink.flag(in_front_of_both(&source.pose(), &x1[0], &x2[0]));
 }

@@ -5,8 +5,11 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+mod bundle;
+mod estimate;
 mod geometry;
 mod linalg;
+mod robust;
 mod sink;
 mod solvers;
 mod source;
@@ -38,6 +41,10 @@ macro_rules! capabilities {
 /// Every capability.
 pub const CAPABILITIES: &[Capability] = capabilities! {
     linalg: scalar null_space row_qr lu ldlt symmetric_eigen svd3 polynomials;
-    geometry: pose rotations pinhole brown_conrady kannala_brandt any_camera residuals two_view_triangulation many_view_triangulation homography fundamental;
-    solvers: relpose_7pt relpose_8pt homography relpose_5pt;
+    geometry: pose rotations pinhole brown_conrady kannala_brandt any_camera residuals two_view_triangulation
+        many_view_triangulation essential homography fundamental;
+    solvers: relpose_5pt relpose_7pt relpose_8pt homography;
+    robust: losses sampling_and_stopping scoring engine;
+    bundle: window;
+    estimate: two_view_relative_pose;
 };

@@ -132,6 +132,12 @@ impl<'a> Source<'a> {
         UnitQuaternion::new_unchecked(quaternion)
     }
 
+    /// A rotation by a quarter of a radian at the most.
+    pub fn small_rotation<T: Real>(&mut self) -> UnitQuaternion<T> {
+        let w = Vector3::from([self.moderate::<T>(), self.moderate(), self.moderate()]);
+        epipole::geometry::pose::exp(&(w * lit::<T>(0.03)))
+    }
+
     /// A rotation as a matrix.
     pub fn rotation_matrix<T: Real>(&mut self) -> Matrix3<T> {
         self.rotation().to_rotation_matrix().into_inner()
