@@ -176,7 +176,7 @@ fn act<T: Real>(
         };
         if let Some(Ok(report)) = report {
             sink.flag(report.changed);
-            sink.finite(&[report.cost_before, report.cost_after]);
+            sink.numbers(&[report.cost_before, report.cost_after]);
             sink.flag(report.cost_after <= report.cost_before);
         }
     }

@@ -68,7 +68,8 @@ impl<T: Real> Window<'_, T> {
             for (x, &value) in to.iter_mut().skip(i).zip(row) {
                 *x = value;
             }
-            if !(abs(to[i]) > tolerance * columns[i]) {
+            let determined = to.get(i).zip(columns.get(i)).is_some_and(|(&d, &c)| abs(d) > tolerance * c);
+            if !determined {
                 return Err(BundleError::Unobservable);
             }
         }
@@ -113,9 +114,9 @@ impl<T: Real> Window<'_, T> {
         let mut gram = [[T::ZERO; 3]; 3];
         let mut columns = [T::ZERO; 3];
         for (i, (to, lead)) in p.iter_mut().zip(root.lead.iter()).enumerate() {
-            for (j, (x, &value)) in to.iter_mut().zip(lead.iter()).enumerate().skip(i) {
+            for ((x, &value), column) in to.iter_mut().zip(lead.iter()).zip(&mut columns).skip(i) {
                 *x = value;
-                columns[j] += value * value;
+                *column += value * value;
             }
         }
         let mut largest = T::ZERO;

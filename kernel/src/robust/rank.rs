@@ -14,7 +14,9 @@ pub fn rank_by_score<T: Real>(scores: &[T], order: &mut [u32]) {
         sift_down(scores, order, root, n);
     }
     for end in (1..n).rev() {
-        order.swap(0, end);
+        if let Some(([first, ..], [last, ..])) = order.split_at_mut_checked(end) {
+            core::mem::swap(first, last);
+        }
         sift_down(scores, order, 0, end);
     }
 }

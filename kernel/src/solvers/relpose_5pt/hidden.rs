@@ -138,19 +138,19 @@ fn orthonormalise<T: Real>(rows: &mut [HiddenRow<T>; 3]) -> Option<()> {
 #[inline]
 pub(super) fn determinant<T: Real, W: Real>(rows: &[HiddenRow<T>; 3]) -> [W; 11] {
     let wide4 = |v: &[T; 4]| v.map(|x| <W as Real>::from_f64(x.to_f64()));
-    let (x, y) = (rows.map(|r| wide4(&r.x)), rows.map(|r| wide4(&r.y)));
-    let one = rows.map(|r| r.one.map(|x| <W as Real>::from_f64(x.to_f64())));
+    let [a, b, c] =
+        rows.each_ref().map(|r| (wide4(&r.x), wide4(&r.y), r.one.map(|x| <W as Real>::from_f64(x.to_f64()))));
     let mut det = [W::ZERO; 11];
-    for (i, j, k) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
+    for (first, second, third) in [(&a, &b, &c), (&b, &c, &a), (&c, &a, &b)] {
         let mut minor = [W::ZERO; 7];
         for p in 0..4 {
             for q in 0..4 {
-                minor[p + q] += x[i][p] * y[j][q] - x[j][p] * y[i][q];
+                minor[p + q] += first.0[p] * second.1[q] - second.0[p] * first.1[q];
             }
         }
         for p in 0..7 {
             for q in 0..5 {
-                det[p + q] += minor[p] * one[k][q];
+                det[p + q] += minor[p] * third.2[q];
             }
         }
     }
