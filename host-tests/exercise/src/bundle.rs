@@ -149,7 +149,7 @@ fn act<T: Real>(
             }
             14 => {
                 if let Ok(gone) = window.marginalise_frame(frame, &loss) {
-                    sink.count(gone.points + gone.prior_frames);
+                    sink.count(gone);
                 }
                 sink.count(window.prior_frame_count());
                 None

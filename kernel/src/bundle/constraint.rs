@@ -95,10 +95,9 @@ impl<T: Real> PosePrior<T> {
 
     fn diagonal(pose: &Pose<T>, turn: T, shift: T) -> Result<Self, WindowError> {
         let base = Placement::from_pose(pose).ok_or(WindowError::NotFinite)?;
-        let mut root = [T::ZERO; 21];
-        for (k, at) in [0, 6, 11, 15, 18, 20].into_iter().enumerate() {
-            root[at] = if k < 3 { turn } else { shift };
-        }
+        let o = T::ZERO;
+        // The rows of an upper triangle, one after the other.
+        let root = [turn, o, o, o, o, o, turn, o, o, o, o, turn, o, o, o, shift, o, o, shift, o, shift];
         Ok(Self { base, root })
     }
 }

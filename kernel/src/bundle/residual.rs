@@ -93,14 +93,14 @@ impl<T: Real> Linear<T> {
     /// Adds `b' W b`.
     #[inline(always)]
     pub(super) fn add_point_block(&self, wb: &[V3<T>; 2], v: &mut S3<T>) {
-        let b = &self.b;
-        let mut k = 0;
-        for i in 0..3 {
-            for j in i..3 {
-                v[k] += b[0][i] * wb[0][j] + b[1][i] * wb[1][j];
-                k += 1;
-            }
-        }
+        let [p, q] = &self.b;
+        let [wp, wq] = wb;
+        v[0] += p[0] * wp[0] + q[0] * wq[0];
+        v[1] += p[0] * wp[1] + q[0] * wq[1];
+        v[2] += p[0] * wp[2] + q[0] * wq[2];
+        v[3] += p[1] * wp[1] + q[1] * wq[1];
+        v[4] += p[1] * wp[2] + q[1] * wq[2];
+        v[5] += p[2] * wp[2] + q[2] * wq[2];
     }
 
     /// `d' W b` and `d' W d`.

@@ -223,7 +223,7 @@ impl<T: Real> TwistedPair<T> {
         let mut all = [true; 4];
         for (a, b) in x1.iter().zip(x2) {
             let sides = self.sides(a, b);
-            all = core::array::from_fn(|k| all[k] & sides[k]);
+            all.iter_mut().zip(sides).for_each(|(all, side)| *all &= side);
             if all == [false; 4] {
                 return None;
             }

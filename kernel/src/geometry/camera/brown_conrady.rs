@@ -183,30 +183,17 @@ impl<T: Real> BrownConrady<T> {
         let (fx, fy) = (self.pinhole.fx(), self.pinhole.fy());
         let (u, v) = (fx * x.x, fy * x.y);
         let xy = T::TWO * x.x * x.y;
-        let j = SMatrix::from_row_slice_generic(
-            nalgebra::Const::<2>,
-            nalgebra::Const::<9>,
-            &[
-                d.x,
-                o,
-                i,
-                o,
-                u * s,
-                u * s * s,
-                fx * xy,
-                fx * (s + T::TWO * x.x * x.x),
-                u * s * s * s,
-                o,
-                d.y,
-                o,
-                i,
-                v * s,
-                v * s * s,
-                fy * (s + T::TWO * x.y * x.y),
-                fy * xy,
-                v * s * s * s,
-            ],
-        );
+        let j = SMatrix::from([
+            [d.x, o],
+            [o, d.y],
+            [i, o],
+            [o, i],
+            [u * s, v * s],
+            [u * s * s, v * s * s],
+            [fx * xy, fy * (s + T::TWO * x.y * x.y)],
+            [fx * (s + T::TWO * x.x * x.x), fy * xy],
+            [u * s * s * s, v * s * s * s],
+        ]);
         finite(j, j.as_slice())
     }
 }

@@ -175,11 +175,16 @@ impl<T: Real> KannalaBrandt<T> {
         let powers = [a3, a3 * s, a3 * s * s, a3 * s * s * s];
         let [q1, q2, q3, q4] = powers;
         let (x, y) = (p.distorted * p.direction.x, p.distorted * p.direction.y);
-        let j = SMatrix::from_row_slice_generic(
-            nalgebra::Const::<2>,
-            nalgebra::Const::<8>,
-            &[x, o, i, o, u * q1, u * q2, u * q3, u * q4, o, y, o, i, v * q1, v * q2, v * q3, v * q4],
-        );
+        let j = SMatrix::from([
+            [x, o],
+            [o, y],
+            [i, o],
+            [o, i],
+            [u * q1, v * q1],
+            [u * q2, v * q2],
+            [u * q3, v * q3],
+            [u * q4, v * q4],
+        ]);
         finite(j, j.as_slice())
     }
 }

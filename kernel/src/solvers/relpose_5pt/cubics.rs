@@ -11,12 +11,16 @@ pub(super) type Cubic<T> = [T; 20];
 
 #[inline(always)]
 fn add<T: Real, const N: usize>(a: &[T; N], b: &[T; N]) -> [T; N] {
-    core::array::from_fn(|i| a[i] + b[i])
+    let mut sum = *a;
+    sum.iter_mut().zip(b).for_each(|(x, y)| *x += *y);
+    sum
 }
 
 #[inline(always)]
 fn sub<T: Real, const N: usize>(a: &[T; N], b: &[T; N]) -> [T; N] {
-    core::array::from_fn(|i| a[i] - b[i])
+    let mut difference = *a;
+    difference.iter_mut().zip(b).for_each(|(x, y)| *x -= *y);
+    difference
 }
 
 #[inline(always)]
