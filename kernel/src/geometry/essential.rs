@@ -59,7 +59,7 @@ impl<T: Real> Essential<T> {
     /// (s1 + s2) / 2, (s1 + s2) / 2, 0.
     ///
     /// # Returns
-    /// `None` where the matrix is not finite, or has no two singular values above `16 EPSILON` of the largest.
+    /// `None` where the matrix or the result is not finite, or it has no two singular values above `16 EPSILON` of the largest.
     /// Where s2 = s3 the nearest matrix is not unique and one of them is returned.
     ///
     /// # References
@@ -80,7 +80,8 @@ impl<T: Real> Essential<T> {
         let [e0, e1, e2] = e.data.0.map(|c| u3.cross(&Vector3::from(c)));
         let turned =
             Matrix3::from_columns(&[e2 * v3.y - e1 * v3.z, e0 * v3.z - e2 * v3.x, e1 * v3.x - e0 * v3.y]);
-        Some(Self((e + turned) * T::HALF))
+        let nearest = (e + turned) * T::HALF;
+        nearest.iter().all(|&x| is_finite(x)).then_some(Self(nearest))
     }
 
     /// The two rotations and the baseline, without a singular value decomposition.
