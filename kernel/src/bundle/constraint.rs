@@ -115,8 +115,6 @@ fn inverse<T: Real>(sigma: T) -> Result<T, WindowError> {
 pub(super) enum At {
     Current,
     Trial,
-    /// Where the marginalisation prior was: what a prior is made of must agree on it.
-    First,
 }
 
 impl<T: Real> FrameSlot<T> {
@@ -125,7 +123,6 @@ impl<T: Real> FrameSlot<T> {
         match at {
             At::Current => &self.pose,
             At::Trial => &self.trial,
-            At::First => &self.first,
         }
     }
 }
@@ -214,8 +211,8 @@ fn prior_rows<T: Real>(
     }
     for frame in frames.iter_mut().filter(|f| f.prior_column != NO_SLOT) {
         let here = *frame.at(at);
-        let e = here.motion_from(&frame.first);
-        let [turn, shift] = here.motion_jacobian(&frame.first, &e);
+        let e = here.motion_from(&frame.linearised);
+        let [turn, shift] = here.motion_jacobian(&frame.linearised, &e);
         let [a, b, c, d, f, g] = e;
         frame.work.e = [a, b, c];
         frame.work.y = [d, f, g];

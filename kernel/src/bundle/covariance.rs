@@ -175,12 +175,12 @@ impl<T: Real> Window<'_, T> {
         let is_last = |i: usize| last_point.is_some_and(|p| p as usize == i);
         for (i, group) in Groups(live).filter(|(i, _)| !is_last(*i)) {
             if let Some(point) = self.points.get(i) {
-                root.insert_point(self.frames, point, group, loss, At::Current, |_| true);
+                root.insert_point(self.frames, point, group, loss, |_| true);
             }
         }
         for (i, group) in Groups(live).filter(|(i, _)| is_last(*i)) {
             if let Some(point) = self.points.get(i) {
-                root.insert_point(self.frames, point, group, loss, At::Current, |_| true);
+                root.insert_point(self.frames, point, group, loss, |_| true);
             }
         }
         Some(root)

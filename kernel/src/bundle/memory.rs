@@ -71,8 +71,8 @@ pub struct FrameSlot<T: Real> {
     pub(super) camera: Option<Camera<T>>,
     pub(super) pose: Placement<T>,
     pub(super) trial: Placement<T>,
-    /// Where the marginalisation prior was linearised; means something only while `prior_column` is a column.
-    pub(super) first: Placement<T>,
+    /// Where the marginalisation prior is linearised; means something only while `prior_column` is a column.
+    pub(super) linearised: Placement<T>,
     pub(super) pose_prior: Option<PosePrior<T>>,
     pub(super) distance: Option<Distance<T>>,
     pub(super) work: Work<T>,
@@ -90,7 +90,7 @@ impl<T: Real> FrameSlot<T> {
         camera: None,
         pose: Placement::IDENTITY,
         trial: Placement::IDENTITY,
-        first: Placement::IDENTITY,
+        linearised: Placement::IDENTITY,
         pose_prior: None,
         distance: None,
         work: Work {

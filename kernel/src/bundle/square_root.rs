@@ -1,10 +1,9 @@
 //! The window's problem in square-root form: constraints and points folded into one triangular factor over the frames.
 //! Marginalisation and covariances are read off it.
 
-use super::constraint::At;
 use super::memory::{FrameSlot, NO_SLOT, ObservationSlot, PointSlot, system_len};
 use super::qr::{insert, packed_len, rotate, row_scale};
-use super::residual::{linearise, residual};
+use super::residual::linearise;
 use super::small::cross;
 use crate::Real;
 use crate::real::sqrt;
@@ -58,7 +57,6 @@ impl<'a, T: Real> SquareRoot<'a, T> {
         point: &PointSlot<T>,
         group: &[ObservationSlot<T>],
         loss: &Loss<T>,
-        at: At,
         enters: impl Fn(&ObservationSlot<T>) -> bool,
     ) {
         for lead in &mut self.lead {
@@ -70,26 +68,14 @@ impl<'a, T: Real> SquareRoot<'a, T> {
             let enters = enters(o);
             let Some(frame) = frames.get(o.frame as usize) else { continue };
             let Some(camera) = &frame.camera else { continue };
-            let place = if frame.slot == NO_SLOT { &frame.pose } else { frame.at(at) };
-            let (Some(now), Some(l)) = (
-                residual(camera, &frame.pose, &point.position, o),
-                linearise(camera, place, &point.position, o, loss, false),
-            ) else {
-                continue;
-            };
-            let e = frame.pose.motion_from(place);
-            let weight = sqrt(loss.evaluate(now[0] * now[0] + now[1] * now[1]).1);
-            for ((d, b), r) in l.d.iter().zip(&l.b).zip(now) {
+            let Some(l) = linearise(camera, &frame.pose, &point.position, o, loss, false) else { continue };
+            let weight = sqrt(l.weight);
+            for ((d, b), r) in l.d.iter().zip(&l.b).zip(l.r) {
                 let turn = cross(&l.y, d);
                 let j = [turn[0], turn[1], turn[2], d[0], d[1], d[2]].map(|x| x * weight);
-                // The residual where the Jacobian was taken.
-                let mut r = r * weight;
-                for k in 0..6 {
-                    r -= j[k] * e[k];
-                }
                 self.row.fill(T::ZERO);
                 if let Some(last) = self.row.get_mut(self.n + 3) {
-                    *last = r;
+                    *last = r * weight;
                 }
                 let Some((own, others)) = self.row.split_at_mut_checked(3) else { return };
                 if !point.fixed {
