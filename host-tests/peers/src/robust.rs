@@ -5,7 +5,8 @@ use std::slice::from_raw_parts;
 
 use epipole::Real;
 use epipole::estimate::{
-    RelativePoseEstimate, RelativePoseOptions, RelativePoseVerdict, TwoViewWorkspace, relative_pose_guided,
+    FundamentalOptions, HomographyOptions, RelativePoseEstimate, RelativePoseOptions, RelativePoseVerdict,
+    TwoViewWorkspace, fundamental, homography, relative_pose_guided,
 };
 use epipole::geometry::{Pinhole, Pose};
 use epipole::nalgebra::Vector2;
@@ -205,3 +206,57 @@ relative_pose_symbols!(
     bench_ransac_relpose_scores_f32,
     bench_verdict_relpose_f32
 );
+
+macro_rules! matrix_symbol {
+    ($t:ty, $memory:ident, $name:ident, $estimate:ident, $options:ident, $matrix:ident) => {
+        /// # Safety
+        /// The arrays have the lengths that the comparison programs state; the calibration is not read.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $name(
+            x1: *const $t,
+            x2: *const $t,
+            n: i32,
+            _k: *const $t,
+            threshold: $t,
+            confidence: $t,
+            max_iterations: i32,
+            seed: u64,
+            out: *mut $t,
+        ) -> i32 {
+            let count = n as usize;
+            let (x1, x2, out) = unsafe {
+                (
+                    from_raw_parts(x1, 2 * count),
+                    from_raw_parts(x2, 2 * count),
+                    std::slice::from_raw_parts_mut(out, 9),
+                )
+            };
+            $memory.with_borrow_mut(|memory| {
+                memory.load(x1, x2);
+                let mut options = $options::default();
+                options.max_error_px = threshold;
+                options.ransac.confidence = confidence;
+                options.ransac.seed = seed;
+                options.ransac.budget.max_iterations = max_iterations.max(1) as u32;
+                let mut workspace = TwoViewWorkspace::from_slices(
+                    &mut memory.numbers,
+                    &mut memory.order,
+                    &mut memory.inliers,
+                );
+                let Ok(estimate) = $estimate(&memory.x1, &memory.x2, &options, &mut workspace) else {
+                    return -2;
+                };
+                let Some(matrix) = estimate.$matrix() else { return -1 };
+                for (o, v) in out.iter_mut().zip(matrix.0.transpose().iter()) {
+                    *o = *v;
+                }
+                estimate.report.inliers as i32
+            })
+        }
+    };
+}
+
+matrix_symbol!(f64, MEMORY_F64, bench_ransac_homography_f64, homography, HomographyOptions, homography);
+matrix_symbol!(f32, MEMORY_F32, bench_ransac_homography_f32, homography, HomographyOptions, homography);
+matrix_symbol!(f64, MEMORY_F64, bench_ransac_fundamental_f64, fundamental, FundamentalOptions, fundamental);
+matrix_symbol!(f32, MEMORY_F32, bench_ransac_fundamental_f32, fundamental, FundamentalOptions, fundamental);

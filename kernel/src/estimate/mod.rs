@@ -3,12 +3,18 @@
 //! | from two views | answers |
 //! |---|---|
 //! | [`relative_pose`] | the pose of view 2 in the frame of view 1, or why there is none |
+//! | [`fundamental`] | `x2' F x1 = 0` without calibration, or why there is none |
+//! | [`homography`] | `x2 ~ H x1` of a plane or a turning camera, or why there is none |
 //!
 //! | from one view of known points | answers |
 //! |---|---|
 //! | [`absolute_pose`] | the camera's pose in the world, both poses of an ambiguous plane, or why there is none |
 
 mod absolute_pose;
+mod chance;
+mod degenerate;
+mod fundamental;
+mod homography;
 mod load;
 mod relative_pose;
 mod transfer;
@@ -18,6 +24,13 @@ pub use absolute_pose::{
     AbsolutePose, AbsolutePoseError, AbsolutePoseEstimate, AbsolutePoseOptions, AbsolutePoseStorage,
     AbsolutePoseVerdict, AbsolutePoseWorkspace, GravityFit, GravityPrior, WideAbsolutePoseStorage,
     absolute_pose, absolute_pose_guided,
+};
+pub use fundamental::{
+    FundamentalError, FundamentalEstimate, FundamentalOptions, FundamentalVerdict, fundamental,
+    fundamental_guided,
+};
+pub use homography::{
+    HomographyError, HomographyEstimate, HomographyOptions, HomographyVerdict, homography, homography_guided,
 };
 pub use relative_pose::{
     GeneralMotion, PlanarPose, PureRotation, RelativePoseError, RelativePoseEstimate, RelativePoseOptions,

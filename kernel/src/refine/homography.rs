@@ -23,6 +23,8 @@ struct Transfer<T> {
     ey: T,
     /// Inverse of its covariance: xx, xy, yy.
     w: [T; 3],
+    /// The error's squared length in that metric.
+    squared: T,
     /// 1 / depth of the transferred point; not positive where it has left the image plane.
     inverse_z: T,
 }
@@ -37,14 +39,13 @@ impl<T: Real> Transfer<T> {
         let (a, b) = ((m[0][0] - u * m[0][2]) * inverse_z, (m[1][0] - u * m[1][2]) * inverse_z);
         let (c, d) = ((m[0][1] - v * m[0][2]) * inverse_z, (m[1][1] - v * m[1][2]) * inverse_z);
         let (xx, xy, yy) = (T::ONE + a * a + b * b, a * c + b * d, T::ONE + c * c + d * d);
-        let scale = T::ONE / (xx * yy - xy * xy);
-        Self { u, v, ex: u - x2, ey: v - y2, w: [yy * scale, -xy * scale, xx * scale], inverse_z }
-    }
-
-    #[inline(always)]
-    fn squared(&self) -> T {
-        let (x, y) = (self.ex, self.ey);
-        self.w[0] * x * x + (self.w[1] + self.w[1]) * x * y + self.w[2] * y * y
+        // The determinant xx yy - xy^2 and the quadratic form, as sums of squares: positive whatever the rounding.
+        let area = a * d - b * c;
+        let scale = T::ONE / (xx + c * c + d * d + area * area);
+        let (ex, ey) = (u - x2, v - y2);
+        let (p, q) = (c * ex - a * ey, d * ex - b * ey);
+        let squared = (ex * ex + ey * ey + p * p + q * q) * scale;
+        Self { u, v, ex, ey, w: [yy * scale, -xy * scale, xx * scale], squared, inverse_z }
     }
 }
 
@@ -54,7 +55,7 @@ pub(crate) fn transfer_sq<T: Real>(h: &Matrix3<T>, block: &PlaneBlock<T>, weight
     let mut squared = [T::MAX; LANES];
     for l in 0..LANES {
         let t = Transfer::new(h, block[0][l], block[1][l], block[2][l], block[3][l]);
-        let s = t.squared() * weight[l];
+        let s = t.squared * weight[l];
         squared[l] = if t.inverse_z > T::ZERO && s <= T::MAX { s } else { T::MAX };
     }
     squared
@@ -86,7 +87,7 @@ where
         for l in 0..LANES {
             let (x, y) = (plane[0][l], plane[1][l]);
             let t = Transfer::new(&h, x, y, plane[2][l], plane[3][l]);
-            let squared = t.squared() * weights[l];
+            let squared = t.squared * weights[l];
             // Written so that a NaN is left out.
             if l >= left || !(squared < support && t.inverse_z > T::ZERO) {
                 continue;

@@ -110,6 +110,19 @@ impl<T> Guide<'_, T> {
     /// Iterations between two questions to `keep_going`.
     pub const INTERVAL: u32 = 8;
 
+    /// An error where there are scores, but not one for each of `count` correspondences.
+    ///
+    /// # Errors
+    /// [`InputError::LengthMismatch`](crate::InputError::LengthMismatch).
+    pub fn check(&self, count: usize) -> Result<(), crate::InputError> {
+        match self.scores {
+            Some(scores) if scores.len() != count => {
+                Err(crate::InputError::LengthMismatch { first: count, second: scores.len() })
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// No scores and no questions.
     #[must_use]
     pub const fn none() -> Self {

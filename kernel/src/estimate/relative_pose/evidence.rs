@@ -5,7 +5,7 @@
 //! By count: correspondences that it leaves unexplained agree with the pose more often than chance. Of `m` unexplained
 //! ones `k` agree; a wrong one agrees with the probability `p`, the share of the image within the threshold of an
 //! epipolar line; the pose has two degrees of freedom left once the simpler model is given, so that the expected number
-//! of accidents as good as this is at most `C(m, 2) P(B(m - 2, p) >= k - 2)`: it must be below `ACCIDENTS`.
+//! of accidents as good as this is at most `C(m, 2) P(B(m - 2, p) >= k - 2)`: it must be below [`ACCIDENTS`](super::super::chance).
 //!
 //! By scatter: on the correspondences that it does explain, the squared error across the epipolar lines is what noise
 //! is, and the one along them must not be larger: the ratio of both is compared with an F distribution's deviation.
@@ -23,43 +23,17 @@ use nalgebra::{Matrix3, Vector3};
 use crate::Real;
 use crate::geometry::pose::nearest_rotation;
 use crate::linalg::{LANES, Lanes};
-use crate::real::{from_u32, lit, ln, max, min, sqrt};
+use crate::real::{from_u32, lit, max, sqrt};
 use crate::refine::blocks::EpipolarBlock;
 use crate::refine::homography::{RotationModel, transfer_sq};
 use crate::refine::lm::Manifold;
 use crate::refine::relative_pose::PoseModel;
-use crate::robust::log_binomial_tail;
 
+use super::super::chance::{EXPLAINED_SIGMAS, beyond_chance};
 use super::hypothesis::PoseProblem;
 
-/// Accidents expected at the most where something counts as proven.
-const ACCIDENTS: f64 = 0.01;
-/// A correspondence is explained by a simpler model up to this many standard deviations in two dimensions: of true
-/// ones 4 in a million lie beyond.
-pub(super) const EXPLAINED_SIGMAS: f64 = 5.0;
 /// Deviations of the ratio of scatters beyond which parallax is proven.
 const SCATTER_DEVIATIONS: f64 = 5.0;
-
-/// ln of the number of ways to choose `k` of `n`, for small `k`.
-fn ln_choose<T: Real>(n: u32, k: u32) -> T {
-    let mut sum = T::ZERO;
-    for i in 0..core::cmp::min(k, 8) {
-        if n > i {
-            sum += ln(from_u32::<T>(n - i) / from_u32::<T>(i + 1));
-        }
-    }
-    sum
-}
-
-/// True where `agreeing` of `count` correspondences agree with a model fitted to `freedom` of them more often than
-/// wrong ones do by accident with probability `p` each.
-pub(super) fn beyond_chance<T: Real>(count: u32, agreeing: u32, freedom: u32, p: T) -> bool {
-    if agreeing <= freedom || count <= freedom {
-        return false;
-    }
-    let tail = log_binomial_tail(count - freedom, agreeing - freedom, p);
-    ln_choose::<T>(count, freedom) + tail < ln(lit(ACCIDENTS))
-}
 
 /// How a simpler model explains the inliers of a pose.
 #[derive(Clone, Copy, Debug)]
@@ -165,34 +139,4 @@ impl<T: Real, B: EpipolarBlock<T>> Evidence<'_, '_, T, B> {
         }
         Some(model)
     }
-}
-
-/// The chance of a wrong correspondence to lie within `threshold` of an epipolar line by the Sampson error: the area of
-/// the band over that of the rectangle that the points of view 2 fill.
-pub(super) fn accident<T: Real, B: EpipolarBlock<T>>(problem: &PoseProblem<'_, T, B>) -> T {
-    let (mut low, mut high) = ([T::MAX; 3], [-T::MAX; 3]);
-    let mut left = problem.data.count;
-    for block in problem.data.blocks {
-        let (_, f2) = block.directions();
-        for l in 0..LANES {
-            for k in 0..3 {
-                if l < left && f2[k][l] > -T::MAX && f2[k][l] < T::MAX {
-                    low[k] = min(low[k], f2[k][l]);
-                    high[k] = max(high[k], f2[k][l]);
-                }
-            }
-        }
-        left = left.saturating_sub(LANES);
-    }
-    // The two longer sides (a plane's third is zero), the shorter of them first.
-    let mut sides = [T::ZERO; 3];
-    for k in 0..3 {
-        sides[k] = max(high[k] - low[k], T::ZERO);
-    }
-    let longest = max(max(sides[0], sides[1]), sides[2]);
-    let shortest = min(min(sides[0], sides[1]), sides[2]);
-    let middle = sides[0] + sides[1] + sides[2] - longest - shortest;
-    // Sampson's error is the distance to the line over sqrt 2 where both lines are alike; the band has two sides.
-    let band = lit::<T>(2.0 * core::f64::consts::SQRT_2) * problem.threshold;
-    if middle > band { band / middle } else { T::ONE }
 }

@@ -2,9 +2,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::super::chance::{EXPLAINED_SIGMAS, beyond_chance, line_accident};
+use super::super::degenerate::{few_distinct, on_a_line};
 use super::covariance::{covariance, variance};
-use super::degenerate::{few_distinct, on_a_line};
-use super::evidence::{EXPLAINED_SIGMAS, Evidence, Explained, accident, beyond_chance};
+use super::evidence::{Evidence, Explained};
 use super::hypothesis::PoseProblem;
 use super::verdict::{GeneralMotion, PureRotation, RelativePoseVerdict, Unobservable};
 use crate::Real;
@@ -40,10 +41,15 @@ pub(super) struct Judgement<T: Real> {
 const PLANE_THRESHOLD: f64 = 1.25;
 
 impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
+    /// The chance of a wrong correspondence to be an inlier.
+    fn accident(&self) -> T {
+        line_accident(self.problem.data, self.problem.threshold)
+    }
+
     /// The verdict where no hypothesis was found at all.
     pub(super) fn without_model(&self) -> RelativePoseVerdict<T> {
         let all = 0..self.problem.data.count as u32;
-        if few_distinct(self.problem, all, self.sigma, accident(self.problem)) {
+        if few_distinct(self.problem.data, all, 5, self.sigma, self.accident()) {
             RelativePoseVerdict::Unobservable(Unobservable::TooFewDistinct)
         } else {
             RelativePoseVerdict::NoConsensus
@@ -54,7 +60,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     pub(super) fn verdict(&self, best: &PoseModel<T>, mask: &mut [bool], order: &mut [u32]) -> Judgement<T> {
         let problem = self.problem;
         let count = problem.data.count as u32;
-        let accident = accident(problem);
+        let accident = self.accident();
         let mut refined = self.refine(best);
         let inliers = self.mark(&refined.model, mask);
         let noise = self.noise(&refined);
@@ -70,7 +76,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         // Where the options promise less noise than there is, the data are believed.
         let sigma = max(self.sigma, noise);
         let indices = list(mask, order);
-        if few_distinct(problem, indices.iter().copied(), sigma, accident) {
+        if few_distinct(problem.data, indices.iter().copied(), 5, sigma, accident) {
             let verdict = RelativePoseVerdict::Unobservable(Unobservable::TooFewDistinct);
             return Judgement { verdict, noise };
         }
@@ -82,7 +88,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                 return self.turned(&rotation, still, sigma, mask);
             }
         }
-        if on_a_line(problem, indices, sigma, accident) {
+        if on_a_line(problem.data, indices, sigma, accident) {
             return Judgement { verdict: RelativePoseVerdict::Unobservable(Unobservable::Collinear), noise };
         }
         if let Some(plane) = self.plane(indices, sigma) {

@@ -14,7 +14,6 @@ use crate::robust::{Guide, OptionsError, RansacOptions, rank_by_score, ransac};
 use crate::{InputError, Real};
 
 mod covariance;
-mod degenerate;
 mod evidence;
 mod hypothesis;
 mod judge;
@@ -138,11 +137,7 @@ pub fn relative_pose_guided<T: Real>(
         None => workspace.capacity_of::<BearingBlock<T>>(),
     };
     check_pixels(x1, x2, 5, capacity)?;
-    if let Some(scores) = guide.scores
-        && scores.len() != x1.len()
-    {
-        return Err(InputError::LengthMismatch { first: x1.len(), second: scores.len() }.into());
-    }
+    guide.check(x1.len())?;
     workspace.count = x1.len();
     Ok(match planes {
         Some((a, b)) => {

@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
+use super::super::chance::EXPLAINED_SIGMAS;
 use super::covariance::{planar_covariance, variance};
-use super::evidence::EXPLAINED_SIGMAS;
 use super::judge::{Judge, Judgement, pose_model};
 use super::verdict::{PlanarPose, RelativePoseVerdict};
 use crate::geometry::{Homography, Pose};

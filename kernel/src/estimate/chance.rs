@@ -1,0 +1,82 @@
+//! What chance explains: how many wrong correspondences agree with a model by accident.
+//!
+//! # References
+//! L. Moisan, B. Stival, "A probabilistic criterion to detect rigid point matches between two images", IJCV 2004 (the
+//! number of false alarms).
+
+use crate::Real;
+use crate::linalg::LANES;
+use crate::real::{from_u32, lit, ln, max, min};
+use crate::refine::blocks::{BlockSlice, EpipolarBlock};
+use crate::robust::log_binomial_tail;
+
+/// Accidents expected at the most where something counts as proven.
+const ACCIDENTS: f64 = 0.01;
+/// A correspondence is explained by a model up to this many standard deviations in two dimensions: of true ones 4 in a
+/// million lie beyond.
+pub(super) const EXPLAINED_SIGMAS: f64 = 5.0;
+
+/// ln of the number of ways to choose `k` of `n`, for small `k`.
+fn ln_choose<T: Real>(n: u32, k: u32) -> T {
+    let mut sum = T::ZERO;
+    for i in 0..core::cmp::min(k, 8) {
+        if n > i {
+            sum += ln(from_u32::<T>(n - i) / from_u32::<T>(i + 1));
+        }
+    }
+    sum
+}
+
+/// True where `agreeing` of `count` correspondences agree with a model fitted to `freedom` of them more often than
+/// wrong ones do by accident with probability `p` each.
+pub(super) fn beyond_chance<T: Real>(count: u32, agreeing: u32, freedom: u32, p: T) -> bool {
+    if agreeing <= freedom || count <= freedom {
+        return false;
+    }
+    let tail = log_binomial_tail(count - freedom, agreeing - freedom, p);
+    ln_choose::<T>(count, freedom) + tail < ln(lit(ACCIDENTS))
+}
+
+/// The chance of a wrong correspondence to lie within `threshold` of an epipolar line by the Sampson error: the area of
+/// the band over that of the rectangle that the points of view 2 fill.
+pub(super) fn line_accident<T: Real, B: EpipolarBlock<T>>(data: BlockSlice<'_, B>, threshold: T) -> T {
+    let (middle, _) = sides(data);
+    // Sampson's error is the distance to the line over sqrt 2 where both lines are alike; the band has two sides.
+    let band = lit::<T>(2.0 * core::f64::consts::SQRT_2) * threshold;
+    if middle > band { band / middle } else { T::ONE }
+}
+
+/// The chance of a wrong correspondence to lie within `radius` of a transferred point: the area of the disc over that
+/// of the rectangle that the points of view 2 fill.
+pub(super) fn point_accident<T: Real, B: EpipolarBlock<T>>(data: BlockSlice<'_, B>, radius: T) -> T {
+    let (a, b) = sides(data);
+    let disc = lit::<T>(core::f64::consts::PI) * radius * radius;
+    if a * b > disc { disc / (a * b) } else { T::ONE }
+}
+
+/// The two longer sides of the box around the points or bearings of view 2, the shorter of them first.
+fn sides<T: Real, B: EpipolarBlock<T>>(data: BlockSlice<'_, B>) -> (T, T) {
+    let (mut low, mut high) = ([T::MAX; 3], [-T::MAX; 3]);
+    let mut left = data.count;
+    for block in data.blocks {
+        let (_, f2) = block.directions();
+        for l in 0..LANES {
+            for k in 0..3 {
+                if l < left && f2[k][l] > -T::MAX && f2[k][l] < T::MAX {
+                    low[k] = min(low[k], f2[k][l]);
+                    high[k] = max(high[k], f2[k][l]);
+                }
+            }
+        }
+        left = left.saturating_sub(LANES);
+    }
+    // A plane's third side is zero.
+    let mut sides = [T::ZERO; 3];
+    for k in 0..3 {
+        sides[k] = max(high[k] - low[k], T::ZERO);
+    }
+    let longest = max(max(sides[0], sides[1]), sides[2]);
+    let shortest = min(min(sides[0], sides[1]), sides[2]);
+    let middle = sides[0] + sides[1] + sides[2] - longest - shortest;
+    (middle, longest)
+}
