@@ -24,7 +24,7 @@ pub use lanes::{LANES, Lanes};
 pub use ldlt::Ldlt;
 pub(crate) use least_singular3::least_singular3;
 pub use lu::Lu;
-pub use null_space::null_space;
+pub use null_space::{null_space, null_space_refined};
 pub use row_qr::{LeastSingular, RowQr};
 pub use svd3::{Svd3, svd3};
 

@@ -40,6 +40,32 @@ use crate::real::{lit, sqrt};
 pub fn null_space<T: Real, const M: usize, const N: usize, const K: usize>(
     rows: &[[T; N]; M],
 ) -> Option<[[T; N]; K]> {
+    reflect::<T, M, N, K, false>(rows)
+}
+
+/// [`null_space`] with one step of iterative refinement: about half of its error, for a quarter more of its time.
+///
+/// What `A` makes of the basis is taken out again by the shortest correction, with the same factors. For solvers that have
+/// no step of their own that repairs the basis.
+///
+/// # Examples
+/// ```
+/// use epipole::linalg::null_space_refined;
+/// let [n] = null_space_refined(&[[1.0_f32, 2.0, 2.0], [0.0, 1.0, -1.0]]).unwrap();
+/// assert!((n[0] + 2.0 * n[1] + 2.0 * n[2]).abs() < 2e-7 && (n[1] - n[2]).abs() < 1e-7);
+/// ```
+#[inline]
+#[must_use]
+pub fn null_space_refined<T: Real, const M: usize, const N: usize, const K: usize>(
+    rows: &[[T; N]; M],
+) -> Option<[[T; N]; K]> {
+    reflect::<T, M, N, K, true>(rows)
+}
+
+#[inline(always)]
+fn reflect<T: Real, const M: usize, const N: usize, const K: usize, const REFINE: bool>(
+    rows: &[[T; N]; M],
+) -> Option<[[T; N]; K]> {
     const { assert!(M + K == N, "the null space of M rows of length N has K = N - M vectors") };
     // Element (c, r) is element c of row r: the loops over r are independent of one another.
     let mut a = [[T::ZERO; M]; N];
@@ -94,6 +120,50 @@ pub fn null_space<T: Real, const M: usize, const N: usize, const K: usize>(
     for j in 0..K {
         q[M + j][j] = T::ONE;
     }
+    reflect_back(&a, &scale, &mut q);
+    if REFINE {
+        // A = L Q': the correction is Q L^-1 of the residual.
+        let mut y = [[T::ZERO; K]; N];
+        for k in 0..M {
+            let mut sum = [T::ZERO; K];
+            for c in 0..N {
+                for j in 0..K {
+                    sum[j] += rows[k][c] * q[c][j];
+                }
+            }
+            // Element (c, k) is that of L for c < k; scale v_kk is the reciprocal of its diagonal.
+            for c in 0..k {
+                for j in 0..K {
+                    sum[j] -= a[c][k] * y[c][j];
+                }
+            }
+            for j in 0..K {
+                y[k][j] = sum[j] * (scale[k] * a[k][k]);
+            }
+        }
+        reflect_back(&a, &scale, &mut y);
+        for c in 0..N {
+            for j in 0..K {
+                q[c][j] -= y[c][j];
+            }
+        }
+    }
+    let mut basis = [[T::ZERO; N]; K];
+    for j in 0..K {
+        for c in 0..N {
+            basis[j][c] = q[c][j];
+        }
+    }
+    Some(basis)
+}
+
+/// Applies the reflections, the last first, to K columns.
+#[inline(always)]
+fn reflect_back<T: Real, const M: usize, const N: usize, const K: usize>(
+    a: &[[T; M]; N],
+    scale: &[T; M],
+    q: &mut [[T; K]; N],
+) {
     for k in (0..M).rev() {
         let mut dot = [T::ZERO; K];
         for c in k..N {
@@ -110,11 +180,4 @@ pub fn null_space<T: Real, const M: usize, const N: usize, const K: usize>(
             }
         }
     }
-    let mut basis = [[T::ZERO; N]; K];
-    for j in 0..K {
-        for c in 0..N {
-            basis[j][c] = q[c][j];
-        }
-    }
-    Some(basis)
 }

@@ -104,7 +104,7 @@ impl<T: Real, const N: usize> RowQr<T, N> {
     /// `None` where `r` is zero, not finite, or so large that its squares are not. Compare `value` and `next_value` to judge the rank.
     ///
     /// # Cost
-    /// At most 16 iterations, and one for `next_value`; two triangular solves each.
+    /// At most 24 iterations, and one for `next_value`; two triangular solves each.
     #[inline]
     #[must_use]
     pub fn least_singular(&self) -> Option<LeastSingular<T, N>> {
@@ -142,20 +142,31 @@ impl<T: Real, const N: usize> RowQr<T, N> {
         x = unit(&x)?;
         let mut left = x;
         let mut last_change = lit::<T>(4.0);
-        for _ in 0..MAX_ITERATIONS {
+        for iteration in 1..=MAX_ITERATIONS {
             left = solver.solve_transposed(&x);
-            let next = unit(&solver.solve(&left))?;
-            let mut change = T::ZERO;
-            for (a, b) in next.iter().zip(&x) {
-                change += (*a - *b) * (*a - *b);
+            let mut next = unit(&solver.solve(&left))?;
+            let mut step = next;
+            for (s, a) in step.iter_mut().zip(&x) {
+                *s -= *a;
             }
-            x = next;
+            let change = sqrt(dot(&step, &step));
             // The change shrinks by the same factor each time: the next one would be below rounding.
-            let enough = lit::<T>(4.0) * T::EPSILON;
-            if change * change <= enough * enough * last_change {
+            if change * change <= lit::<T>(4.0) * T::EPSILON * last_change {
+                x = next;
                 break;
             }
-            last_change = change;
+            // Now and then the whole series of changes to come is taken at once (Aitken).
+            if iteration % 3 == 0 && change < last_change * lit(0.99) {
+                let series = change / (last_change - change);
+                for (a, s) in next.iter_mut().zip(&step) {
+                    *a += series * *s;
+                }
+                next = unit(&next)?;
+                last_change = lit(4.0);
+            } else {
+                last_change = change;
+            }
+            x = next;
         }
         // The same on what is orthogonal to both singular vectors found.
         let left = unit(&left)?;
@@ -208,7 +219,7 @@ impl<T: Real, const N: usize> RowQr<T, N> {
     }
 }
 
-const MAX_ITERATIONS: u32 = 16;
+const MAX_ITERATIONS: u32 = 24;
 
 fn dot<T: Real, const N: usize>(a: &[T; N], b: &[T; N]) -> T {
     let mut sum = T::ZERO;

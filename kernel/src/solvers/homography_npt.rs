@@ -34,7 +34,7 @@ const BLOCK: usize = 5;
 /// By Householder QR, never through `A'A`: transfer errors of a few `EPSILON` for exact points.
 ///
 /// # Cost
-/// 360 operations a correspondence, and up to 16 inverse iterations.
+/// 360 operations a correspondence, and up to 24 inverse iterations.
 ///
 /// # References
 /// R. Hartley and A. Zisserman, "Multiple View Geometry in Computer Vision", 2nd edition, 2003, algorithm 4.2. Deviation:

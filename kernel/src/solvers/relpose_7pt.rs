@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::geometry::{Fundamental, Whitening};
-use crate::linalg::{cubic_roots, null_space};
+use crate::linalg::{cubic_roots, null_space_refined};
 use crate::real::{abs, lit, sqrt};
 use crate::{Real, Solutions};
 
@@ -64,7 +64,7 @@ pub fn relpose_7pt<T: Real>(x1: &[Vector3<T>; 7], x2: &[Vector3<T>; 7]) -> Solut
             b.y * a.y,
         ];
     }
-    let Some([a, b]) = null_space(&rows) else { return solutions };
+    let Some([a, b]) = null_space_refined(&rows) else { return solutions };
     let (mut a, mut b) = (matrix(&a), matrix(&b));
     let mut c = determinant_of_pencil(&a, &b);
     // A member far from singular becomes A, so that no root is near infinity. A cubic form that is small at all four
