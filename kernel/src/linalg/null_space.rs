@@ -86,12 +86,16 @@ fn reflect<T: Real, const M: usize, const N: usize, const K: usize, const REFINE
     let mut full_rank = true;
     for k in 0..M {
         // Products of what is left of row k with itself and with the rows after it, in one pass.
-        let mut dot = [T::ZERO; M];
+        // Two sums, so that additions do not wait for one another.
+        let (mut dot, mut odd) = ([T::ZERO; M], [T::ZERO; M]);
         for c in k..N {
-            let v = a[c][k];
-            for r in k..M {
-                dot[r] += v * a[c][r];
+            let (v, sum) = (a[c][k], if (c - k) & 1 == 0 { &mut dot } else { &mut odd });
+            for r in 0..M {
+                sum[r] += v * a[c][r];
             }
+        }
+        for r in 0..M {
+            dot[r] += odd[r];
         }
         let head = a[k][k];
         let length = sqrt(dot[k]);
@@ -165,14 +169,15 @@ fn reflect_back<T: Real, const M: usize, const N: usize, const K: usize>(
     q: &mut [[T; K]; N],
 ) {
     for k in (0..M).rev() {
-        let mut dot = [T::ZERO; K];
+        let (mut dot, mut odd) = ([T::ZERO; K], [T::ZERO; K]);
         for c in k..N {
+            let sum = if (c - k) & 1 == 0 { &mut dot } else { &mut odd };
             for j in 0..K {
-                dot[j] += a[c][k] * q[c][j];
+                sum[j] += a[c][k] * q[c][j];
             }
         }
         for j in 0..K {
-            dot[j] *= scale[k];
+            dot[j] = (dot[j] + odd[j]) * scale[k];
         }
         for c in k..N {
             for j in 0..K {

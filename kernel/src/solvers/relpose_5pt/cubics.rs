@@ -67,7 +67,7 @@ fn quadric_times_linear<T: Real>(q: &Quadric<T>, l: &Linear<T>) -> Cubic<T> {
 }
 
 /// `E E' E - tr(E E') E / 2 = 0` (nine cubics) and `det E = 0`, of the entries of `E` (row by row) as linear forms.
-#[inline]
+#[inline(never)]
 pub(super) fn essential_cubics<T: Real>(e: &[Linear<T>; 9]) -> [Cubic<T>; 10] {
     let row_products = |r: usize, s: usize| {
         let p = linear_times_linear(&e[3 * r], &e[3 * s]);

@@ -17,39 +17,30 @@ pub(super) struct HiddenRow<T> {
 
 /// Gauss elimination of the ten cubics (partial pivoting), as far as the six rows that lead with
 /// xxz xxw yyz yyw xyz xyw need it. `None` where a pivot vanishes.
-#[inline]
-pub(super) fn eliminate<T: Real>(mut m: [Cubic<T>; 10]) -> Option<[HiddenRow<T>; 3]> {
-    for k in 0..10 {
-        let (mut pivot, mut largest) = (k, abs(m[k][k]));
-        for i in k + 1..10 {
-            if abs(m[i][k]) > largest {
-                (pivot, largest) = (i, abs(m[i][k]));
-            }
-        }
-        if !(largest > T::ZERO) {
-            return None;
-        }
-        if pivot != k {
-            m.swap(k, pivot);
-        }
-        let inverse = T::ONE / m[k][k];
-        let row = m[k].map(|v| v * inverse);
-        m[k] = row;
-        for i in k + 1..10 {
-            let f = m[i][k];
-            for c in k + 1..20 {
-                m[i][c] -= f * row[c];
-            }
-        }
-    }
-    // Back substitution of rows 4 to 8 in the last ten columns.
-    for k in (5..10).rev() {
-        let row = m[k];
-        for i in 4..k {
-            let f = m[i][k];
+#[inline(never)]
+pub(super) fn eliminate<T: Real>(m: &mut [Cubic<T>; 10]) -> Option<[HiddenRow<T>; 3]> {
+    let mut inverse = [T::ZERO; 10];
+    inverse[0] = column::<T, 0>(m)?;
+    inverse[1] = column::<T, 1>(m)?;
+    inverse[2] = column::<T, 2>(m)?;
+    inverse[3] = column::<T, 3>(m)?;
+    inverse[4] = column::<T, 4>(m)?;
+    inverse[5] = column::<T, 5>(m)?;
+    inverse[6] = column::<T, 6>(m)?;
+    inverse[7] = column::<T, 7>(m)?;
+    inverse[8] = column::<T, 8>(m)?;
+    inverse[9] = column::<T, 9>(m)?;
+    // Back substitution of rows 4 to 9 in the last ten columns.
+    for k in (4..10).rev() {
+        let mut row = m[k];
+        for j in k + 1..10 {
+            let f = row[j];
             for c in 10..20 {
-                m[i][c] -= f * row[c];
+                row[c] -= f * m[j][c];
             }
+        }
+        for c in 10..20 {
+            m[k][c] = row[c] * inverse[k];
         }
     }
     // Row p leads with a monomial times z, row q with the same monomial times w: p - z q is free of both.
@@ -61,6 +52,39 @@ pub(super) fn eliminate<T: Real>(mut m: [Cubic<T>; 10]) -> Option<[HiddenRow<T>;
     let mut rows = [hidden(&m[4], &m[5]), hidden(&m[6], &m[7]), hidden(&m[8], &m[9])];
     orthonormalise(&mut rows)?;
     Some(rows)
+}
+
+/// Brings the largest element of column `K`, from row `K` down, into row `K` and eliminates the column below it. The
+/// inverse of the pivot.
+#[inline(always)]
+fn column<T: Real, const K: usize>(m: &mut [Cubic<T>; 10]) -> Option<T> {
+    let (mut pivot, mut largest) = (K, abs(m[K][K]));
+    for i in K + 1..10 {
+        let size = abs(m[i][K]);
+        if size > largest {
+            (pivot, largest) = (i, size);
+        }
+    }
+    if !(largest > T::ZERO) {
+        return None;
+    }
+    // Row K goes where the pivot's row was; no branch, for which of the two happens is a coin's toss.
+    let mut row = [T::ZERO; 20];
+    for c in K..20 {
+        row[c] = m[pivot][c];
+        m[pivot][c] = m[K][c];
+    }
+    let inverse = T::ONE / row[K];
+    for c in K..20 {
+        m[K][c] = row[c];
+    }
+    for i in K + 1..10 {
+        let f = m[i][K] * inverse;
+        for c in K + 1..20 {
+            m[i][c] -= f * row[c];
+        }
+    }
+    Some(inverse)
 }
 
 impl<T: Real> HiddenRow<T> {
@@ -88,17 +112,20 @@ impl<T: Real> HiddenRow<T> {
         self
     }
 
+    #[inline(always)]
     fn dot(&self, other: &Self) -> T {
-        let mut sum = T::ZERO;
+        // Four sums, so that no addition waits for the one before it.
+        let mut sum: [T; 4] = core::array::from_fn(|i| self.x[i] * other.x[i]);
         for i in 0..4 {
-            sum += self.x[i] * other.x[i] + self.y[i] * other.y[i];
+            sum[i] += self.y[i] * other.y[i];
         }
-        for i in 0..5 {
-            sum += self.one[i] * other.one[i];
+        for i in 0..4 {
+            sum[i] += self.one[i] * other.one[i];
         }
-        sum
+        (sum[0] + sum[1]) + (sum[2] + sum[3]) + self.one[4] * other.one[4]
     }
 
+    #[inline(always)]
     fn add_scaled(&mut self, other: &Self, f: T) {
         for i in 0..4 {
             self.x[i] += f * other.x[i];
@@ -109,6 +136,7 @@ impl<T: Real> HiddenRow<T> {
         }
     }
 
+    #[inline(always)]
     fn scale(&mut self, f: T) {
         self.x = self.x.map(|v| v * f);
         self.y = self.y.map(|v| v * f);
@@ -117,21 +145,21 @@ impl<T: Real> HiddenRow<T> {
 }
 
 /// Gram-Schmidt on the rows: the determinant changes by a factor only, and its coefficients keep their digits.
-fn orthonormalise<T: Real>(rows: &mut [HiddenRow<T>; 3]) -> Option<()> {
-    let [a, b, c] = rows;
-    let unit = |r: &mut HiddenRow<T>| {
-        let n = r.dot(r);
-        r.scale(T::ONE / sqrt(n));
-        (n > T::ZERO).then_some(())
-    };
-    unit(a)?;
-    unit(b)?;
-    unit(c)?;
-    b.add_scaled(a, -a.dot(b));
-    unit(b)?;
-    c.add_scaled(a, -a.dot(c));
-    c.add_scaled(b, -b.dot(c));
-    unit(c)
+#[inline(always)]
+fn orthonormalise<T: Real>([a, b, c]: &mut [HiddenRow<T>; 3]) -> Option<()> {
+    let s = T::ONE / a.dot(a);
+    b.add_scaled(a, -(a.dot(b) * s));
+    c.add_scaled(a, -(a.dot(c) * s));
+    c.add_scaled(b, -(b.dot(c) / b.dot(b)));
+    let norms = [a.dot(a), b.dot(b), c.dot(c)];
+    for (row, n) in [a, b, c].into_iter().zip(norms) {
+        // False for NaN, too.
+        if !(n > T::ZERO && n <= T::MAX) {
+            return None;
+        }
+        row.scale(T::ONE / sqrt(n));
+    }
+    Some(())
 }
 
 /// The determinant of the three rows, coefficients from z^0 to z^10, in the scalar `W`.

@@ -108,7 +108,7 @@ fn solve<T: Real, W: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) -> Soluti
     }
     let Some(null) = null_space::<T, 5, 9, 4>(&rows) else { return Solutions::new() };
     let basis: [[T; 4]; 9] = core::array::from_fn(|i| [null[0][i], null[1][i], null[2][i], null[3][i]]);
-    let Some(rows) = hidden::eliminate(essential_cubics(&basis)) else { return Solutions::new() };
+    let Some(rows) = hidden::eliminate(&mut essential_cubics(&basis)) else { return Solutions::new() };
 
     let error = lit::<W>(POLYNOMIAL_ERROR) * lit(T::EPSILON.to_f64());
     let narrow = |v: W| lit::<T>(v.to_f64());
@@ -184,7 +184,7 @@ struct Found<T> {
 
 impl<T: Real> Found<T> {
     /// Newton from each candidate; keeps those that arrive at an essential matrix not found before.
-    #[inline]
+    #[inline(always)]
     fn add(
         &mut self,
         basis: &[[T; 4]; 9],
@@ -193,24 +193,31 @@ impl<T: Real> Found<T> {
     ) {
         let mut left = candidates.len;
         for &[num, den] in candidates.groups.iter().take(candidates.len.div_ceil(4)) {
-            let mut c = start(num, den);
-            let mut arrived = [false; 4];
-            let threshold = Four::splat(T::EPSILON);
-            for _ in 0..STEPS {
-                let (next, step_sq) = polish::newton_step(basis, &c);
-                c = core::array::from_fn(|k| Four::select(arrived, c[k], next[k]));
-                let small = threshold.greater(step_sq);
-                arrived = core::array::from_fn(|k| arrived[k] | small[k] | (k >= left));
-                if arrived == [true; 4] {
-                    break;
-                }
-            }
-            for k in 0..4 {
-                if k < left && arrived[k] {
-                    self.keep([c[0].0[k], c[1].0[k], c[2].0[k], c[3].0[k]]);
-                }
-            }
+            self.add_group(basis, start(num, den), left);
             left = left.saturating_sub(4);
+        }
+    }
+
+    /// The first `count` of four candidates.
+    #[inline(never)]
+    fn add_group(&mut self, basis: &[[T; 4]; 9], mut c: [Four<T>; 4], count: usize) {
+        let mut arrived: [bool; 4] = core::array::from_fn(|k| k >= count);
+        let threshold = Four::splat(T::EPSILON);
+        let mut near = [false; 4];
+        for _ in 0..STEPS {
+            let (next, step_sq) = polish::newton_step(basis, &c);
+            c = core::array::from_fn(|k| Four::select(near, c[k], next[k]));
+            let small = threshold.greater(step_sq);
+            near = core::array::from_fn(|k| near[k] | small[k]);
+            arrived = core::array::from_fn(|k| arrived[k] | small[k]);
+            if arrived == [true; 4] {
+                break;
+            }
+        }
+        for k in 0..4 {
+            if k < count && near[k] {
+                self.keep([c[0].0[k], c[1].0[k], c[2].0[k], c[3].0[k]]);
+            }
         }
     }
 

@@ -35,7 +35,7 @@ pub(super) fn select<T: Real, const N: usize>(
 }
 
 /// One step from the unit vectors `c`: the next unit vectors, and the squared lengths of the steps.
-#[inline]
+#[inline(never)]
 pub(super) fn newton_step<T: Real>(basis: &[[T; 4]; 9], c: &[Four<T>; 4]) -> ([Four<T>; 4], Four<T>) {
     let e: [Four<T>; 9] = core::array::from_fn(|i| {
         let [b0, b1, b2, b3] = basis[i];
