@@ -11,6 +11,7 @@ use epipole::real::lit;
 
 use crate::geometry::any_camera_model;
 use crate::robust::any_loss;
+pub(crate) use crate::window_calls::random_calls;
 use crate::{Sink, Source};
 
 const FRAMES: usize = 3;

@@ -13,6 +13,7 @@ mod robust;
 mod sink;
 mod solvers;
 mod source;
+mod window_calls;
 
 pub use sink::Sink;
 pub use source::Source;
@@ -45,6 +46,6 @@ pub const CAPABILITIES: &[Capability] = capabilities! {
         many_view_triangulation essential homography fundamental;
     solvers: relpose_5pt relpose_7pt relpose_8pt homography;
     robust: losses sampling_and_stopping scoring engine;
-    bundle: window;
+    bundle: window random_calls;
     estimate: two_view_relative_pose;
 };
