@@ -69,4 +69,12 @@ table! {
     NULL_VECTOR_P99: 1.8e-4, 1e-15,
         "99th percentile of the distance of unit-norm E from the solution of the same rounded points in f64 (which is \
          itself 8e-5 off the truth, for f32)";
+    TRANSFER_P99: 6e-6, 2e-14,
+        "radians, 99th percentile; the figure aimed at for four points rounded to f32, of any shape of quadrilateral";
+    TRANSFER_FOUR: 3e-5, 6e-14,
+        "radians; the four points themselves, of quadrilaterals with a thin triangle among them";
+    PLANE_MOTION: 2e-5, 4e-14,
+        "R, t / d and n times |t / d|: a few EPSILON of the homography, a little more near a double singular value";
+    EPIPOLE: 2e-4, 1e-12,
+        "radians; EPSILON in the elements of F over the angle between its columns, 1/1000 in pixels";
 }

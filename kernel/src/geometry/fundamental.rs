@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::Real;
 use crate::linalg::least_singular3;
-use crate::real::{lit, sqrt};
+use crate::real::{is_finite, lit, sqrt};
 
 /// A fundamental matrix, known up to scale and sign.
 ///
@@ -69,6 +69,9 @@ impl<T: Real> Fundamental<T> {
 
 /// The unit vector perpendicular to the columns of a matrix of rank 2.
 fn null_of_columns<T: Real>(m: &Matrix3<T>) -> Option<Vector3<T>> {
+    if !m.iter().all(|&x| is_finite(x)) {
+        return None;
+    }
     let [a, b, c] = m.data.0.map(Vector3::from);
     let (mut best, mut best_sine_sq) = (Vector3::zeros(), T::ZERO);
     // The two columns that are least parallel: a measure that their lengths, in pixels of all sizes, do not change.

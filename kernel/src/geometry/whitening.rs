@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::Real;
-use crate::real::sqrt;
+use crate::real::{lit, sqrt};
 
 /// A linear map `T`, lower triangular in the order z, x, y, after which homogeneous points have unit second moments:
 /// `sum (T x)(T x)' = I`.
@@ -50,8 +50,12 @@ impl<T: Real> Whitening<T> {
         }
         let c = xy / xx;
         let rest = yy - c * xy;
-        // Written so that NaN fails too. An infinite zz leaves NaN in the other moments.
-        if !(rest > T::EPSILON * yy && zz > T::ZERO) {
+        // What rounding of the coordinates leaves of a line's width, and of the subtraction above. Written so that NaN fails
+        // too; an infinite coordinate leaves NaN in the centred moments.
+        let rounding = lit::<T>(8.0) * T::EPSILON;
+        let floor = rounding * rounding * (xx + yy + (a * a + b * b + T::ONE) * zz);
+        let width = xx * (rest / (xx + yy));
+        if !(width > floor && rest > T::EPSILON * yy && zz > T::ZERO) {
             return None;
         }
         Some(Self {
