@@ -77,4 +77,8 @@ table! {
         "R, t / d and n times |t / d|: a few EPSILON of the homography, a little more near a double singular value";
     EPIPOLE: 2e-4, 1e-12,
         "radians; EPSILON in the elements of F over the angle between its columns, 1/1000 in pixels";
+    SOLVED_BEARING: 2e-3, 1e-6,
+        "radians between a bearing and its point under a solution; two solutions that merge keep half the digits";
+    UPRIGHT_EPIPOLAR: 2e-2, 1e-6,
+        "t' (R x1 x x2) of unit vectors, at a root of the determinant; two roots that merge keep half the digits";
 }

@@ -164,7 +164,9 @@ pub(crate) fn fits<T: Real>(
     }
     let scale = sqrt(spread);
     let inverse = T::ONE / scale;
-    if !(scale > T::ZERO && inverse > T::ZERO) {
+    // What rounding leaves of equal points is no spread.
+    let tiny = T::EPSILON * lit::<T>(16.0) * sqrt(mean.norm_squared());
+    if !(scale > tiny && inverse > T::ZERO) {
         return found;
     }
     let centred = pairs.map(|(f, x)| (f, (x - mean) * inverse));

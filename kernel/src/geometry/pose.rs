@@ -304,10 +304,12 @@ pub fn nearest_rotation<T: Real>(m: &Matrix3<T>) -> Option<Matrix3<T>> {
 #[must_use]
 pub fn upright<T: Real>(gravity: &Vector3<T>) -> Option<Matrix3<T>> {
     let largest = max(max(abs(gravity.x), abs(gravity.y)), abs(gravity.z));
-    if !(largest > T::ZERO && largest <= T::MAX) {
+    // The sum is not finite where a component is not.
+    let sum = gravity.x + gravity.y + gravity.z;
+    if !(largest > T::ZERO && abs(sum) <= T::MAX && largest <= T::MAX) {
         return None;
     }
-    let g = gravity * (T::ONE / largest);
+    let g = gravity / largest;
     let mut g = g * (T::ONE / sqrt(g.norm_squared()));
     // Half a turn about x first where the angle is obtuse.
     let obtuse = g.y < T::ZERO;

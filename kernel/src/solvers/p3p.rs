@@ -77,18 +77,20 @@ pub fn p3p<T: Real>(bearings: &[Vector3<T>; 3], points: &[Vector3<T>; 3]) -> Sol
     let k2 = (T::ONE - a) * s02 + b * (T::TWO * as12 + bs12 + w);
     let k1 = (T::ONE - b) * s01 + a * (T::TWO * bs12 + as12 + w);
     let k0 = a * (as12 - s01);
-    // A leading coefficient of zero (an isosceles triangle seen as one) is a root at infinity: a large one serves.
-    let least = T::EPSILON * lit::<T>(8.0) * (abs(k2) + abs(k1) + abs(k0));
+    // A leading coefficient of zero (an isosceles triangle seen as one) is a root at infinity: one serves whose seventh
+    // power is still finite.
+    let least = T::EPSILON * lit::<T>(64.0) * (abs(k2) + abs(k1) + abs(k0));
     let k3 = if abs(k3) > least { k3 } else { least };
     let inverse = T::ONE / k3;
-    let s = real_root_of_cubic(k2 * inverse, k1 * inverse, k0 * inverse);
-    // D01 + s D02, the pair of lines
-    let c00 = T::ONE + s;
-    let (c01, c02) = (-m01, -s * m02);
-    let ab = a + s * b;
-    let (c11, c22) = (T::ONE - ab, s - ab);
+    let root = real_root_of_cubic(k2 * inverse, k1 * inverse, k0 * inverse);
+    // The pair of lines s1 D01 + s2 D02; what follows takes fourth powers.
+    let (s1, s2) = if abs(root) > lit(1e3) { (T::ONE / root, T::ONE) } else { (T::ONE, root) };
+    let c00 = s1 + s2;
+    let (c01, c02) = (-s1 * m01, -s2 * m02);
+    let ab = s1 * a + s2 * b;
+    let (c11, c22) = (s1 - ab, s2 - ab);
     let (am12, bm12) = (a * m12, b * m12);
-    let c12 = am12 + s * bm12;
+    let c12 = ab * m12;
     let conic = Matrix3::new(c00, c01, c02, c01, c11, c12, c02, c12, c22);
 
     // R maps (f1, f2, f1 x f2) to the same of the camera's points: R = [e1 e2 e1 x e2] [g1 g2 g3]'
@@ -102,7 +104,7 @@ pub fn p3p<T: Real>(bearings: &[Vector3<T>; 3], points: &[Vector3<T>; 3]) -> Sol
         return solutions;
     }
 
-    // The points of the two lines on the conic s D01 - D02, the farthest from the pair. Nothing here branches: what is
+    // The points of the two lines on the conic s2 D01 - s1 D02, the farthest from the pair. Nothing here branches: what is
     // not real becomes NaN and fails the last comparison.
     let mut candidates = [[T::ZERO; 3]; 4];
     let mut count = 0;
@@ -111,9 +113,9 @@ pub fn p3p<T: Real>(bearings: &[Vector3<T>; 3], points: &[Vector3<T>; 3]) -> Sol
         let (l0, l1, l2) = (line.x, line.y, line.z);
         let (l00, l11, l22, l12) = (l0 * l0, l1 * l1, l2 * l2, l1 * l2);
         let (m1, m2) = (m01 * l0, m02 * l0);
-        let q2 = s * (l11 + T::TWO * m1 * l1 + (T::ONE - a) * l00) - (l11 - b * l00);
-        let q1 = s * (l12 + m1 * l2 + am12 * l00) - (l12 + m2 * l1 + bm12 * l00);
-        let q0 = s * (l22 - a * l00) - (l22 + T::TWO * m2 * l2 + (T::ONE - b) * l00);
+        let q2 = s2 * (l11 + T::TWO * m1 * l1 + (T::ONE - a) * l00) - s1 * (l11 - b * l00);
+        let q1 = s2 * (l12 + m1 * l2 + am12 * l00) - s1 * (l12 + m2 * l1 + bm12 * l00);
+        let q0 = s2 * (l22 - a * l00) - s1 * (l22 + T::TWO * m2 * l2 + (T::ONE - b) * l00);
         let (square, product) = (q1 * q1, q2 * q0);
         let discriminant = square - product;
         // A double root may fall on either side of zero by rounding.
@@ -153,8 +155,8 @@ pub fn p3p<T: Real>(bearings: &[Vector3<T>; 3], points: &[Vector3<T>; 3]) -> Sol
 fn refine<T: Real>(d: &mut [T; 3], u: [T; 3], a: [T; 3], largest: T) -> bool {
     let [u01, u02, u12] = u;
     let [a01, a02, a12] = a;
-    // A residual whose square is lost in rounding: the step that follows it is the last.
-    let quadratic = largest * sqrt(T::EPSILON) * lit::<T>(0.25);
+    // After a Newton step what remains of a residual is the square of the step.
+    let converged = largest * T::EPSILON * lit::<T>(32.0);
     for _ in 0..MAX_REFINEMENTS {
         let [d0, d1, d2] = *d;
         // |d0 x0 - d1 x1|^2 = (d0 - d1)^2 + 2 u01 d0 d1: no cancellation before the difference from a01
@@ -165,7 +167,6 @@ fn refine<T: Real>(d: &mut [T; 3], u: [T; 3], a: [T; 3], largest: T) -> bool {
         let r01 = (e01 * e01 - a01) * T::HALF + v01 * d1;
         let r02 = (e02 * e02 - a02) * T::HALF + v02 * d2;
         let r12 = (e12 * e12 - a12) * T::HALF + v12 * d2;
-        let size = abs(r01) + abs(r02) + abs(r12);
         // J = [p q 0; r 0 s; 0 u v] by its adjugate
         let (p, q) = (e01 + v10, v01 - e01);
         let (r, s) = (e02 + v20, v02 - e02);
@@ -173,10 +174,11 @@ fn refine<T: Real>(d: &mut [T; 3], u: [T; 3], a: [T; 3], largest: T) -> bool {
         let (su, rv) = (s * u, r * v);
         let inverse = T::ONE / (p * su + q * rv);
         let w = v * r02 - s * r12;
-        d[0] = d0 - (su * r01 + q * w) * inverse;
-        d[1] = d1 - (rv * r01 - p * w) * inverse;
-        d[2] = d2 - (u * (p * r02 - r * r01) + q * r * r12) * inverse;
-        if size < quadratic {
+        let step0 = (su * r01 + q * w) * inverse;
+        let step1 = (rv * r01 - p * w) * inverse;
+        let step2 = (u * (p * r02 - r * r01) + q * r * r12) * inverse;
+        *d = [d0 - step0, d1 - step1, d2 - step2];
+        if step0 * step0 + step1 * step1 + step2 * step2 < converged {
             return min(min(d[0], d[1]), d[2]) > T::ZERO;
         }
     }
