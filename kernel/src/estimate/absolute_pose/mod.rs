@@ -14,7 +14,8 @@ use crate::refine::reprojection::{BearingPointBlock, CameraPose, PlanePointBlock
 use crate::robust::budget::check_noise;
 use crate::robust::loss::Loss;
 use crate::robust::{
-    Consensus, Guide, OptionsError, RansacOptions, log_binomial_tail, rank_by_score, ransac,
+    Consensus, Guide, OptionsError, RansacOptions, iterations_needed, log_binomial_tail, rank_by_score,
+    ransac,
 };
 use crate::{InputError, Real, Solutions};
 
@@ -103,6 +104,8 @@ const NEEDED: usize = 4;
 const LOG_ODDS: f64 = 4.6;
 /// A consensus is believed if chance makes one like it with less than this probability (the logarithm of 5 %).
 const LOG_CHANCE: f64 = -3.0;
+/// Samples drawn at the most to find out that the points lie behind the camera.
+const MAX_BEHIND: u32 = 300;
 /// Standard deviations beyond which a prior is contradicted.
 const PRIOR_SIGMAS: f64 = 4.0;
 
@@ -343,10 +346,14 @@ fn estimate<T: Real, B: ReprojectionBlock<T>>(
     };
     let found = consensus.models[0].map(|(model, _)| model);
     let believed = found.filter(|_| beyond_chance(task, &problem, &consensus));
+    // Points behind the camera show a depth-reversed shape that a part of them fits in front, too.
+    let few = 2 * consensus.report.inliers < count as u32;
+    if few && behind_camera(task, &problem, &consensus) {
+        estimate.verdict = AbsolutePoseVerdict::BehindCamera;
+        return estimate;
+    }
     let Some(model) = believed else {
-        if behind_camera(task, &problem) {
-            estimate.verdict = AbsolutePoseVerdict::BehindCamera;
-        } else if found.is_some() && consensus.report.inliers > 3 {
+        if found.is_some() && consensus.report.inliers > 3 {
             estimate.verdict = AbsolutePoseVerdict::TooFewInliers;
         }
         return estimate;
@@ -465,16 +472,21 @@ fn beyond_chance<T: Real, B: ReprojectionBlock<T>>(
     ln(tried) + tail < lit(LOG_CHANCE)
 }
 
-/// True where poses with the points behind the camera find a consensus.
+/// True where poses with the points behind the camera find a consensus twice as large as the one in front.
 fn behind_camera<T: Real, B: ReprojectionBlock<T>>(
     task: &Task<'_, T>,
     problem: &PoseProblem<'_, T, B>,
+    in_front: &Consensus<CameraPose<T>, T>,
 ) -> bool {
+    let count = problem.data.count as u32;
+    let wanted = core::cmp::max(2 * in_front.report.inliers, NEEDED as u32);
     let mirrored = PoseProblem { facing: -T::ONE, ..*problem };
     let mut options = task.options.ransac;
-    options.budget.max_iterations = core::cmp::min(options.budget.max_iterations, 500);
-    let consensus = ransac::<T, _, 3>(&mirrored, &options, None, NEEDED as u32, None);
-    beyond_chance(task, &mirrored, &consensus)
+    let needed = iterations_needed(options.confidence, wanted, count, 3);
+    options.budget.max_iterations =
+        core::cmp::min(options.budget.max_iterations, core::cmp::min(needed, MAX_BEHIND));
+    let behind = ransac::<T, _, 3>(&mirrored, &options, None, wanted, None);
+    behind.report.inliers >= wanted && beyond_chance(task, &mirrored, &behind)
 }
 
 /// The sum of the inliers' squared residuals, px^2.

@@ -1,0 +1,233 @@
+//! Robust absolute pose: the truth under outliers, covariance, priors, verdicts, errors, repeated bits.
+
+use epipole::estimate::{
+    AbsolutePoseError, AbsolutePoseEstimate, AbsolutePoseOptions, AbsolutePoseStorage, AbsolutePoseVerdict,
+    GravityFit, GravityPrior, Unobservable, WideAbsolutePoseStorage, absolute_pose,
+};
+use epipole::geometry::pose::log;
+use epipole::geometry::{CameraModel, KannalaBrandt, Pinhole, Pose};
+use epipole::nalgebra::{Matrix6, Point3, Vector2, Vector3, Vector6};
+use epipole::real::lit;
+use epipole::refine::{PosePrior, RefineAbsolutePoseOptions, absolute_pose as refine_pose};
+use epipole::robust::OptionsError;
+use epipole::{InputError, Real};
+use epipole_host_tests::matchers::{rotation_error, vector_f64};
+use epipole_host_tests::scenes::{AbsoluteScene, CENTRE, FOCAL, Motion, Scene, Shape};
+use epipole_host_tests::{for_each_case, in_both_scalars, share_of};
+
+const N: usize = 100;
+
+fn camera<T: Real>() -> Pinhole<T> {
+    Pinhole::new(lit(FOCAL), lit(FOCAL), lit(CENTRE.0), lit(CENTRE.1)).expect("positive")
+}
+
+fn problem(shape: Shape, noise_px: f64, outliers: f64, seed: u64) -> AbsoluteScene {
+    let scene = Scene::new(Motion::General, N).shape(shape).noise_px(noise_px).outliers(outliers);
+    AbsoluteScene::generate(&scene, seed)
+}
+
+fn run<T: Real>(
+    pixels: &[Vector2<T>],
+    points: &[Vector3<T>],
+    options: &AbsolutePoseOptions<T>,
+) -> AbsolutePoseEstimate<T> {
+    let mut storage = AbsolutePoseStorage::<T, N>::new();
+    absolute_pose(&camera(), pixels, points, options, &mut storage.workspace()).expect("well-formed")
+}
+
+fn options<T: Real>(max_error_px: f64) -> AbsolutePoseOptions<T> {
+    let mut options = AbsolutePoseOptions::default();
+    options.max_error_px = lit(max_error_px);
+    options
+}
+
+in_both_scalars! {
+    fn the_pose_under_outliers<T>() {
+        for outliers in [0.0, 0.3, 0.6] {
+            share_of(60, |seed, _| {
+                let p = problem(Shape::Volume, 1.0, outliers, seed);
+                let estimate = run::<T>(&p.pixels(), &p.points(), &options(3.0));
+                let again = run::<T>(&p.pixels(), &p.points(), &options(3.0));
+                assert_eq!(estimate, again);
+                estimate.pose().is_some_and(|pose| {
+                    let moved = vector_f64(&pose.translation.vector) - p.pose.translation.vector;
+                    rotation_error(&pose.rotation, &p.pose.rotation) < 5e-3 && moved.norm() < 0.15
+                })
+            })
+            .assert_at_least(1.0);
+        }
+    }
+
+    fn verdicts<T>() {
+        for_each_case(30, |seed, rng| {
+            let verdict = |p: &AbsoluteScene| run::<T>(&p.pixels(), &p.points(), &options(2.0)).verdict;
+            let line = verdict(&problem(Shape::Line, 0.5, 0.0, seed));
+            assert!(matches!(line, AbsolutePoseVerdict::Unobservable(Unobservable::Collinear) | AbsolutePoseVerdict::NoConsensus), "{line:?}");
+            let three = verdict(&problem(Shape::Repeated(3), 0.5, 0.0, seed));
+            assert!(matches!(three, AbsolutePoseVerdict::Unobservable(Unobservable::TooFewDistinct)), "{three:?}");
+            let none = verdict(&problem(Shape::Volume, 0.5, 1.0, seed));
+            assert!(matches!(none, AbsolutePoseVerdict::NoConsensus | AbsolutePoseVerdict::TooFewInliers), "{none:?}");
+            // All axes of the world point the wrong way: what was in front is behind.
+            let p = problem(Shape::Volume, 0.5, 0.2, seed);
+            let flipped: Vec<Vector3<T>> = p.points::<T>().iter().map(|x| -x).collect();
+            let behind = run::<T>(&p.pixels(), &flipped, &options(2.0)).verdict;
+            assert!(matches!(behind, AbsolutePoseVerdict::BehindCamera), "{behind:?}");
+            // A small plane far away.
+            let truth = Pose::new(Vector3::new(0.1, 0.2, 12.0), Vector3::new(0.5, 0.3 * rng.unit(), 0.0));
+            let flat: Vec<Vector3<f64>> = (0..N)
+                .map(|_| Vector3::new(rng.range(-0.3, 0.3), rng.range(-0.3, 0.3), 0.0))
+                .collect();
+            let pixels: Vec<Vector2<T>> = flat
+                .iter()
+                .map(|x| {
+                    let pixel = camera::<f64>().project(&(truth * Point3::from(*x)).coords).expect("in front");
+                    (pixel + Vector2::new(rng.normal(), rng.normal())).map(lit)
+                })
+                .collect();
+            let flat: Vec<Vector3<T>> = flat.iter().map(|x| x.map(lit)).collect();
+            let estimate = run::<T>(&pixels, &flat, &options(3.0));
+            let poses: Vec<Pose<T>> = match &estimate.verdict {
+                AbsolutePoseVerdict::PlanarAmbiguity(poses) => poses.iter().map(|p| p.pose).collect(),
+                AbsolutePoseVerdict::Pose(found) => vec![found.pose],
+                other => panic!("{other:?}"),
+            };
+            let error = poses.iter().map(|p| rotation_error(&p.rotation, &truth.rotation)).fold(9.0, f64::min);
+            assert!(error < 0.2, "{error} of {}", poses.len());
+        });
+    }
+
+    fn a_gravity_prior_helps_or_is_left_aside<T>() {
+        let mut iterations = [0u32; 2];
+        for_each_case(30, |seed, rng| {
+            let p = problem(Shape::Volume, 1.0, 0.5, seed);
+            let (pixels, points) = (p.pixels::<T>(), p.points::<T>());
+            let plain = run(&pixels, &points, &options(3.0));
+            let down = Vector3::new(0.0, 1.0, 0.2);
+            let prior = |error_rad: f64, rng: &mut epipole_host_tests::Rng| {
+                let axis = down.cross(&rng.direction()).normalize() * error_rad;
+                let camera = p.pose.rotation * (epipole::nalgebra::UnitQuaternion::new(axis) * down);
+                let mut options = options(3.0);
+                options.gravity = Some(GravityPrior { world: down.map(lit::<T>), camera: camera.map(lit), sigma_rad: lit(0.009) });
+                options
+            };
+            let aided = run(&pixels, &points, &prior(0.006, rng));
+            assert!(matches!(aided.gravity, Some(GravityFit::Fits(_))), "{:?}", aided.gravity);
+            let error = |e: &AbsolutePoseEstimate<T>| rotation_error(&e.pose().expect("a pose").rotation, &p.pose.rotation);
+            assert!(error(&aided) < 5e-3);
+            iterations[0] += plain.report.spent.iterations;
+            iterations[1] += aided.report.spent.iterations;
+            let wrong = run(&pixels, &points, &prior(0.17, rng));
+            assert!(matches!(wrong.gravity, Some(GravityFit::Contradicted(_))), "{:?}", wrong.gravity);
+            let apart = rotation_error(&wrong.pose().expect("a pose").rotation, &plain.pose().expect("a pose").rotation);
+            assert!(apart < 1e-3, "{apart}");
+        });
+        assert!(iterations[1] * 2 < iterations[0] || std::env::var("EPIPOLE_SEED").is_ok(), "{iterations:?}");
+    }
+
+    fn malformed_input_is_named<T>() {
+        let p = problem(Shape::Volume, 0.0, 0.0, 1);
+        let (mut pixels, mut points) = (p.pixels::<T>(), p.points::<T>());
+        let mut storage = AbsolutePoseStorage::<T, 8>::new();
+        let mut call = |pixels: &[Vector2<T>], points: &[Vector3<T>], options: &AbsolutePoseOptions<T>| {
+            absolute_pose(&camera(), pixels, points, options, &mut storage.workspace()).err()
+        };
+        let plain = options(2.0);
+        let input = |error| Some(AbsolutePoseError::Input(error));
+        assert_eq!(call(&pixels[..7], &points[..6], &plain), input(InputError::LengthMismatch { first: 7, second: 6 }));
+        assert_eq!(call(&pixels[..3], &points[..3], &plain), input(InputError::TooFew { given: 3, needed: 4 }));
+        assert_eq!(call(&pixels[..9], &points[..9], &plain), input(InputError::TooMany { given: 9, capacity: 8 }));
+        points[5].z = lit(f64::INFINITY);
+        assert_eq!(call(&pixels[..8], &points[..8], &plain), input(InputError::NotFinite { array: 1, index: 5 }));
+        pixels[2].x = lit(f64::NAN);
+        assert_eq!(call(&pixels[..8], &points[..8], &plain), input(InputError::NotFinite { array: 0, index: 2 }));
+        assert_eq!(call(&pixels, &points, &options(-1.0)), Some(AbsolutePoseError::Options(OptionsError::MaxError)));
+        let mut odd = plain;
+        odd.gravity = Some(GravityPrior { world: Vector3::zeros(), camera: Vector3::y(), sigma_rad: T::ONE });
+        assert_eq!(call(&pixels, &points, &odd), Some(AbsolutePoseError::Gravity));
+    }
+}
+
+#[test]
+fn the_covariance_is_that_of_the_errors() {
+    let (mut scatter, mut predicted, mut count) = (Matrix6::zeros(), Matrix6::zeros(), 0.0);
+    let base = problem(Shape::Volume, 0.0, 0.0, 7);
+    for_each_case(400, |_, rng| {
+        let noisy: Vec<Vector2<f64>> = base
+            .pixels()
+            .iter()
+            .map(|x: &Vector2<f64>| x + Vector2::new(rng.normal(), rng.normal()))
+            .collect();
+        let estimate = run::<f64>(&noisy, &base.points(), &options(6.0));
+        let AbsolutePoseVerdict::Pose(found) = &estimate.verdict else { panic!("{:?}", estimate.verdict) };
+        let w = log(&(found.pose.rotation * base.pose.rotation.inverse()));
+        let t = found.pose.translation.vector - base.pose.translation.vector;
+        let error = Vector6::new(w.x, w.y, w.z, t.x, t.y, t.z);
+        scatter += error * error.transpose();
+        predicted += found.covariance.expect("a volume");
+        count += 1.0;
+    });
+    if count > 300.0 {
+        // 400 samples give a variance to 7 %: four of those.
+        for k in 0..6 {
+            let ratio = scatter[(k, k)] / predicted[(k, k)];
+            assert!((ratio - 1.0).abs() < 0.28, "{k}: {ratio}");
+        }
+    }
+}
+
+#[test]
+fn a_fisheye_camera() {
+    let fisheye = KannalaBrandt::new(
+        Pinhole::new(300.0, 300.0, 400.0, 300.0).expect("positive"),
+        [0.02, -0.005, 0.001, 0.0],
+    )
+    .expect("monotone");
+    for_each_case(20, |_, rng| {
+        let truth = Pose::new(rng.normal3() * 0.3, rng.direction() * 0.2);
+        let (mut pixels, mut points) = (Vec::new(), Vec::new());
+        while pixels.len() < N {
+            let x = truth.inverse() * Point3::from(rng.direction() * rng.range(2.0, 8.0));
+            if let Some(pixel) = fisheye.project(&(truth * x).coords) {
+                let wrong = pixels.len() % 4 == 0;
+                let at =
+                    if wrong { Vector2::new(rng.range(0.0, 800.0), rng.range(0.0, 600.0)) } else { pixel };
+                pixels.push(at + Vector2::new(rng.normal(), rng.normal()) * 0.3);
+                points.push(x.coords);
+            }
+        }
+        let mut storage = WideAbsolutePoseStorage::<f64, N>::new();
+        let estimate = absolute_pose(&fisheye, &pixels, &points, &options(1.5), &mut storage.workspace())
+            .expect("well-formed");
+        let pose = estimate.pose().expect("a pose");
+        assert!(rotation_error(&pose.rotation, &truth.rotation) < 3e-3);
+        let refined = refine_pose(&fisheye, &pixels, &points, &pose, &RefineAbsolutePoseOptions::default())
+            .expect("well-formed");
+        assert!(refined.cost <= refined.initial_cost);
+        assert!(rotation_error(&refined.pose.rotation, &truth.rotation) < 3e-3);
+    });
+}
+
+#[test]
+fn a_prior_weighs_what_it_says() {
+    let p = problem(Shape::Volume, 1.0, 0.0, 3);
+    let (pixels, points) = (p.pixels::<f64>(), p.points::<f64>());
+    let away = Pose::from_parts(
+        (p.pose.translation.vector + Vector3::new(0.5, 0.0, 0.0)).into(),
+        epipole::nalgebra::UnitQuaternion::new(Vector3::new(0.0, 0.02, 0.0)) * p.pose.rotation,
+    );
+    let refine = |information: f64, count: usize| {
+        let mut options = RefineAbsolutePoseOptions::default();
+        options.prior = Some(PosePrior { pose: away, information: Matrix6::identity() * information });
+        refine_pose(&camera(), &pixels[..count], &points[..count], &p.pose, &options).expect("well-formed")
+    };
+    let distance =
+        |pose: &Pose<f64>, to: &Pose<f64>| (pose.translation.vector - to.translation.vector).norm();
+    // A certain prior is obeyed, a vague one is not, and without points it is all there is.
+    assert!(distance(&refine(1e12, N).pose, &away) < 1e-4);
+    assert!(distance(&refine(1e-9, N).pose, &p.pose) < 0.1);
+    let alone = refine(1.0, 0);
+    assert!(
+        distance(&alone.pose, &away) < 1e-6 && rotation_error(&alone.pose.rotation, &away.rotation) < 1e-6
+    );
+    assert!(alone.covariance.is_some());
+}
