@@ -3,7 +3,7 @@
 use super::chance::{EXPLAINED_SIGMAS, beyond_chance};
 use crate::Real;
 use crate::linalg::LANES;
-use crate::real::lit;
+use crate::real::{lit, sqrt};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock};
 use crate::robust::Sampler;
 
@@ -24,11 +24,67 @@ fn point<T: Real, B: EpipolarBlock<T>>(data: BlockSlice<'_, B>, index: u32) -> O
     Some([at(0)?, at(1)?, at(2)?, at(3)?])
 }
 
-/// Squared distance of a point from the line through two, in the two coordinates from `k` on, in units of `scale`.
-fn line_distance_sq<T: Real>(p: &Point<T>, a: &Point<T>, b: &Point<T>, k: usize, scale: T) -> T {
-    let (dx, dy) = (b[k] - a[k], b[k + 1] - a[k + 1]);
-    let c = (p[k] - a[k]) * dy - (p[k + 1] - a[k + 1]) * dx;
-    c * c * scale / (dx * dx + dy * dy)
+/// A line of each view: a point, and the unit normal.
+type Line<T> = [[T; 4]; 2];
+
+/// Squared distances of a point from a line of each view.
+fn distances_sq<T: Real>(p: &Point<T>, line: &Line<T>) -> [T; 2] {
+    let [c, n] = line;
+    let d1 = (p[0] - c[0]) * n[0] + (p[1] - c[1]) * n[1];
+    let d2 = (p[2] - c[2]) * n[2] + (p[3] - c[3]) * n[3];
+    [d1 * d1, d2 * d2]
+}
+
+/// The lines through two points.
+fn through<T: Real>(a: &Point<T>, b: &Point<T>) -> Line<T> {
+    let normal = |k: usize| {
+        let (x, y) = (b[k] - a[k], b[k + 1] - a[k + 1]);
+        let scale = T::ONE / sqrt(x * x + y * y);
+        (-y * scale, x * scale)
+    };
+    let ((a1, b1), (a2, b2)) = (normal(0), normal(2));
+    [*a, [a1, b1, a2, b2]]
+}
+
+/// The lines of least squares through the points that lie within `limit` of `line`.
+fn fit<T: Real, B: EpipolarBlock<T>>(
+    data: BlockSlice<'_, B>,
+    inliers: &[u32],
+    line: &Line<T>,
+    limit: T,
+) -> Line<T> {
+    let on = |p: &Point<T>| distances_sq(p, line).iter().all(|d| *d < limit);
+    let mut near = inliers.iter().filter_map(|&i| point(data, i)).filter(on);
+    let Some(first) = near.next() else { return *line };
+    // Moments about the first point.
+    let (mut n, mut sum, mut square, mut cross) = (T::ONE, [T::ZERO; 4], [T::ZERO; 4], [T::ZERO; 2]);
+    for p in near {
+        n += T::ONE;
+        let d = [p[0] - first[0], p[1] - first[1], p[2] - first[2], p[3] - first[3]];
+        for k in 0..4 {
+            sum[k] += d[k];
+            square[k] += d[k] * d[k];
+        }
+        cross[0] += d[0] * d[1];
+        cross[1] += d[2] * d[3];
+    }
+    let mut result = *line;
+    for view in 0..2 {
+        let (x, y) = (2 * view, 2 * view + 1);
+        let (mx, my) = (sum[x] / n, sum[y] / n);
+        let (xx, yy, xy) = (square[x] / n - mx * mx, square[y] / n - my * my, cross[view] / n - mx * my);
+        // The direction of the larger moment, from the half angle: (xx - yy + r, 2 xy) or (2 xy, yy - xx + r).
+        let r = sqrt((xx - yy) * (xx - yy) + lit::<T>(4.0) * xy * xy);
+        let (dx, dy) = if xx > yy { (xx - yy + r, T::TWO * xy) } else { (T::TWO * xy, yy - xx + r) };
+        let length = sqrt(dx * dx + dy * dy);
+        if length > T::ZERO {
+            result[0][x] = first[x] + mx;
+            result[0][y] = first[y] + my;
+            result[1][x] = -dy / length;
+            result[1][y] = dx / length;
+        }
+    }
+    result
 }
 
 /// True where the inliers lie on one line in both views but for as few as chance explains.
@@ -39,32 +95,46 @@ pub(super) fn on_a_line<T: Real, B: EpipolarBlock<T>>(
     accident: T,
 ) -> bool {
     let total = inliers.len() as u32;
-    let scale = T::ONE / (sigma * sigma);
-    let limit: T = lit(EXPLAINED_SIGMAS * EXPLAINED_SIGMAS);
+    let limit = sigma * sigma * lit(EXPLAINED_SIGMAS * EXPLAINED_SIGMAS);
     let outside = (data.count as u32).saturating_sub(total);
     let mut sampler = Sampler::<T>::uniform(0, total);
     for k in 0..LINES {
         let Some([i, j]) = sampler.sample::<2>(k) else { return false };
         let end = |i: u32| inliers.get(i as usize).and_then(|&i| point(data, i));
         let (Some(a), Some(b)) = (end(i), end(j)) else { continue };
-        let mut off = 0;
-        let mut proven = false;
-        for &index in inliers {
-            let Some(p) = point(data, index) else { continue };
-            let on = line_distance_sq(&p, &a, &b, 0, scale) < limit
-                && line_distance_sq(&p, &a, &b, 2, scale) < limit;
-            off += !on as u32;
-            // Looked at now and then, so that an ordinary scene is soon done.
-            if off % 8 == 7 && !on && beyond_chance(outside + off, off, 2, accident) {
-                proven = true;
-                break;
-            }
+        let first = through(&a, &b);
+        if off_line(data, inliers, &first, limit * lit(9.0), total / 2) > total / 2 {
+            continue;
         }
-        if !proven && !beyond_chance(outside + off, off, 2, accident) {
+        // Two noisy points give a coarse line; all near it give a good one.
+        let coarse = fit(data, inliers, &first, limit * lit(9.0));
+        let line = fit(data, inliers, &coarse, limit);
+        let off = off_line(data, inliers, &line, limit, total);
+        if !beyond_chance(outside + off, off, 2, accident) {
             return true;
         }
     }
     false
+}
+
+/// How many inliers do not lie on the line in both views; counting ends beyond `most`, so that an ordinary scene is soon
+/// done.
+fn off_line<T: Real, B: EpipolarBlock<T>>(
+    data: BlockSlice<'_, B>,
+    inliers: &[u32],
+    line: &Line<T>,
+    limit: T,
+    most: u32,
+) -> u32 {
+    let mut off = 0;
+    for &index in inliers {
+        let on = point(data, index).is_some_and(|p| distances_sq(&p, line).iter().all(|d| *d < limit));
+        off += !on as u32;
+        if off > most {
+            break;
+        }
+    }
+    off
 }
 
 /// True where the inliers are repetitions of fewer than `needed` distinct points but for as few as chance explains.

@@ -81,6 +81,9 @@ pub(crate) trait EpipolarBlock<T: Real>: Block<T> {
     /// bearings what makes distances angles, NaN where a bearing does not meet the plane.
     fn planes(&self) -> (PlaneBlock<T>, Lanes<T>);
 
+    /// View 1 of these correspondences with view 2 of others: wrong correspondences.
+    fn mispaired(&self, other: &Self) -> Self;
+
     /// The homogeneous points or bearings, component by component.
     fn directions(&self) -> ([Lanes<T>; 3], [Lanes<T>; 3]);
 }
@@ -143,6 +146,10 @@ impl<T: Real> EpipolarBlock<T> for PlaneBlock<T> {
             g[8][l] = inverse;
         }
         (r, g)
+    }
+
+    fn mispaired(&self, other: &Self) -> Self {
+        [self[0], self[1], other[2], other[3]]
     }
 
     #[inline(always)]
@@ -217,6 +224,14 @@ impl<T: Real> EpipolarBlock<T> for BearingBlock<T> {
             }
         }
         (r, g)
+    }
+
+    fn mispaired(&self, other: &Self) -> Self {
+        let mut block = *other;
+        for k in [0, 1, 2, 6, 7, 8, 9, 10, 11] {
+            block[k] = self[k];
+        }
+        block
     }
 
     #[inline(always)]

@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn tangents_agree_with_central_differences() {
-        let m = Matrix3::new(0.3, -0.7, 0.2, 0.9, 0.1, -0.4, 0.5, -0.6, 0.8);
+        let m = Matrix3::<f64>::new(0.3, -0.7, 0.2, 0.9, 0.1, -0.4, 0.5, -0.6, 0.8);
         let model = FundamentalModel::new(&m).unwrap();
         assert!(model.matrix().determinant().abs() < 1e-15);
         for (k, tangent) in model.tangents().iter().enumerate() {

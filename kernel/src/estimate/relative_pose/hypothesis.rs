@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::Real;
 use crate::geometry::Essential;
 use crate::linalg::{LANES, Lanes};
-use crate::real::{abs, lit, sqrt};
+use crate::real::{abs, from_u32, lit, sqrt};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock};
 use crate::refine::lm::{Manifold, Minimum, minimise};
 use crate::refine::relative_pose::{PoseModel, Scales};
@@ -93,6 +93,33 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         }
     }
 
+    /// The share of wrong correspondences that a pose explains by accident, measured on the correspondences
+    /// themselves with view 2 of another in place of their own; never below `least`.
+    pub(super) fn accident(&self, model: &PoseModel<T>, least: T) -> T {
+        let view = self.view(model);
+        let blocks = self.data.blocks;
+        let full = blocks.get(..self.data.count / LANES).unwrap_or(blocks);
+        let (mut hits, mut seen) = (0u32, 0u32);
+        let half = full.len() / 2;
+        for shift in [self.stride, half, self.stride / 2] {
+            // Blocks of the list and of the list turned by `shift`, but not a block with itself.
+            let shift = if shift < full.len() { shift } else { 0 };
+            if shift == 0 {
+                continue;
+            }
+            let (start, end) = full.split_at_checked(shift).unwrap_or((full, &[]));
+            for (block, other) in full.iter().zip(end.iter().chain(start)) {
+                let squared = self.squared_in_front(&block.mispaired(other), model, &view);
+                for s in squared {
+                    hits += (s < T::ONE) as u32;
+                }
+                seen += LANES as u32;
+            }
+        }
+        let share = from_u32::<T>(hits + 2) / from_u32(seen + 2);
+        if seen > 0 && share > least { share } else { least }
+    }
+
     /// The model that minimises a loss, from `model`.
     pub(super) fn optimise(
         &self,
@@ -158,7 +185,7 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
                     at -= blocks.len();
                 }
             }
-            if gate.rejects(tally.cost(), tally.inliers(), crate::real::from_u32(seen)) {
+            if gate.rejects(tally.cost(), tally.inliers(), from_u32(seen)) {
                 counts.residuals += seen as u64;
                 counts.rejected_residuals += seen as u64;
                 counts.rejected_inliers += tally.inliers().to_f64() as u64;

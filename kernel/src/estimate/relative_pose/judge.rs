@@ -60,8 +60,8 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     pub(super) fn verdict(&self, best: &PoseModel<T>, mask: &mut [bool], order: &mut [u32]) -> Judgement<T> {
         let problem = self.problem;
         let count = problem.data.count as u32;
-        let accident = self.accident();
         let mut refined = self.refine(best);
+        let accident = problem.accident(&refined.model, self.accident());
         let inliers = self.mark(&refined.model, mask);
         let noise = self.noise(&refined);
         if !beyond_chance(count, inliers, 5, accident) {
