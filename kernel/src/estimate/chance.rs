@@ -30,11 +30,31 @@ fn ln_choose<T: Real>(n: u32, k: u32) -> T {
 /// True where `agreeing` of `count` correspondences agree with a model fitted to `freedom` of them more often than
 /// wrong ones do by accident with probability `p` each.
 pub(super) fn beyond_chance<T: Real>(count: u32, agreeing: u32, freedom: u32, p: T) -> bool {
+    ln_accidents(count, agreeing, freedom, p) < ln(lit(ACCIDENTS))
+}
+
+/// ln of the expected number of accidents, of models fitted to `freedom` of `count` wrong correspondences, with which as
+/// many as `agreeing` agree; 0 or more where that is nothing.
+fn ln_accidents<T: Real>(count: u32, agreeing: u32, freedom: u32, p: T) -> T {
     if agreeing <= freedom || count <= freedom {
-        return false;
+        return T::ZERO;
     }
     let tail = log_binomial_tail(count - freedom, agreeing - freedom, p);
-    ln_choose::<T>(count, freedom) + tail < ln(lit(ACCIDENTS))
+    ln_choose::<T>(count, freedom) + tail
+}
+
+/// [`beyond_chance`] with independent evidence beside the count: a statistic that lies `deviations` standard deviations
+/// above what chance makes of it.
+pub(super) fn beyond_chance_with<T: Real>(
+    count: u32,
+    agreeing: u32,
+    freedom: u32,
+    p: T,
+    deviations: T,
+) -> bool {
+    let by_count = min(ln_accidents(count, agreeing, freedom, p), T::ZERO);
+    let z = max(deviations, T::ZERO);
+    by_count - z * z * T::HALF < ln(lit(ACCIDENTS))
 }
 
 /// The chance of a wrong correspondence to lie within `threshold` of an epipolar line by the Sampson error: the area of

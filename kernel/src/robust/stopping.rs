@@ -80,8 +80,11 @@ pub fn undetected_inlier_ratio<T: Real>(confidence: T, iterations: u32, count: u
     from_u32::<T>(high) / from_u32::<T>(core::cmp::max(count, 1))
 }
 
-/// An upper bound of `ln P(B >= k)` for a binomial `B` of `n` trials with success probability `p`, by Hoeffding's
-/// inequality in its relative-entropy form: `-n D(k/n || p)`, 0 where `k <= n p`.
+/// An upper bound of `ln P(B >= k)` for a binomial `B` of `n` trials with success probability `p`; 0 where `k <= n p`.
+///
+/// The probability of `k` itself is at most `exp(-n D(k/n || p)) sqrt(n / (2 pi k (n - k)))` by Stirling's formula, and
+/// the terms beyond fall at least as fast as a geometric series; where that is no better, Hoeffding's inequality
+/// `-n D(k/n || p)` stands.
 #[must_use]
 pub fn log_binomial_tail<T: Real>(n: u32, k: u32, p: T) -> T {
     if n == 0 || k == 0 || k > n {
@@ -95,7 +98,14 @@ pub fn log_binomial_tail<T: Real>(n: u32, k: u32, p: T) -> T {
     }
     let hit = q * ln(q / p);
     let miss = if k < n { (T::ONE - q) * ln((T::ONE - q) / (T::ONE - p)) } else { T::ZERO };
-    -(total * (hit + miss))
+    let bound = -(total * (hit + miss));
+    if k >= n {
+        return bound;
+    }
+    let (k, rest) = (from_u32::<T>(k), from_u32::<T>(n - k));
+    let ratio = p * rest / ((k + T::ONE) * (T::ONE - p));
+    let stirling = ln(total / (lit::<T>(core::f64::consts::TAU) * k * rest)) * T::HALF;
+    bound + min(stirling - ln(T::ONE - ratio), T::ZERO)
 }
 
 #[cfg(test)]

@@ -1,14 +1,14 @@
 //! Which of the simpler models (no motion, a rotation, a plane) the inliers of a relative pose leave standing.
 //!
-//! A simpler model is given up where the data prove parallax against it, in one of two ways.
+//! A simpler model is given up where the data prove parallax against it, in one of two ways or both together.
 //!
 //! By count: correspondences that it leaves unexplained agree with the pose more often than chance. Of `m` unexplained
 //! ones `k` agree; a wrong one agrees with the probability `p`, the share of the image within the threshold of an
 //! epipolar line; the pose has two degrees of freedom left once the simpler model is given, so that the expected number
-//! of accidents as good as this is at most `C(m, 2) P(B(m - 2, p) >= k - 2)`: it must be below [`ACCIDENTS`](super::super::chance).
+//! of accidents as good as this is at most `C(m, 2) P(B(m - 2, p) >= k - 2)`: it must be below 0.01.
 //!
 //! By scatter: on the correspondences that it does explain, the squared error across the epipolar lines is what noise
-//! is, and the one along them must not be larger: the ratio of both is compared with an F distribution's deviation.
+//! is, and the one along them must not be larger: the logarithm of the ratio of both has a known deviation.
 //!
 //! # References
 //! L. Moisan, B. Stival, "A probabilistic criterion to detect rigid point matches between two images", IJCV 2004 (the
@@ -23,17 +23,14 @@ use nalgebra::{Matrix3, Vector3};
 use crate::Real;
 use crate::geometry::pose::nearest_rotation;
 use crate::linalg::{LANES, Lanes};
-use crate::real::{from_u32, lit, max, sqrt};
+use crate::real::{from_u32, lit, ln, max, sqrt};
 use crate::refine::blocks::EpipolarBlock;
 use crate::refine::homography::{RotationModel, transfer_sq};
 use crate::refine::lm::Manifold;
 use crate::refine::relative_pose::PoseModel;
 
-use super::super::chance::{EXPLAINED_SIGMAS, beyond_chance};
+use super::super::chance::{EXPLAINED_SIGMAS, beyond_chance_with};
 use super::hypothesis::PoseProblem;
-
-/// Deviations of the ratio of scatters beyond which parallax is proven.
-const SCATTER_DEVIATIONS: f64 = 5.0;
 
 /// How a simpler model explains the inliers of a pose.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +41,7 @@ pub(super) struct Explained<T> {
     pub(super) inliers: u32,
     /// Inliers of the pose that it does not.
     pub(super) others: u32,
-    /// Sum over the explained inliers of the squared error in two dimensions, in units of sigma.
+    /// Sum over the explained ones of the squared error in two dimensions, in units of sigma.
     pub(super) squares: T,
     /// Sum over the same of the squared error across the epipolar lines.
     pub(super) across: T,
@@ -78,13 +75,13 @@ impl<T: Real, B: EpipolarBlock<T>> Evidence<'_, '_, T, B> {
             for (l, &inlier) in (0..LANES).zip(mask.by_ref()) {
                 let explained = squared[l] < limit;
                 result.all += explained as u32;
-                if inlier && explained {
-                    result.inliers += 1;
+                if explained {
+                    // Inliers of the pose or not: their errors across the lines must not be cut off.
                     result.squares += squared[l];
                     result.across += c[l] * c[l] * scale / d[l];
-                } else if inlier {
-                    result.others += 1;
                 }
+                result.inliers += (inlier && explained) as u32;
+                result.others += (inlier && !explained) as u32;
             }
         }
         result
@@ -92,20 +89,19 @@ impl<T: Real, B: EpipolarBlock<T>> Evidence<'_, '_, T, B> {
 
     /// True where the data prove parallax against a simpler model with `parameters` degrees of freedom.
     pub(super) fn proves_parallax(&self, count: u32, explained: &Explained<T>, parameters: u32) -> bool {
-        let unexplained = count.saturating_sub(explained.all);
-        if beyond_chance(unexplained, explained.others, 2, self.accident) {
-            return true;
-        }
-        let n = explained.inliers;
+        let n = explained.all;
         if n <= parameters {
             return true;
         }
-        let (along, free) = (explained.squares - explained.across, from_u32::<T>(n));
         // The pose takes 5 of the freedom across; the model's parameters beyond those lie along.
-        let along = along / from_u32((n + 5).saturating_sub(parameters));
+        let along = (explained.squares - explained.across) / from_u32((n + 5).saturating_sub(parameters));
         // Noise below half of what it is said to be is not believed.
         let across = max(explained.across / from_u32(n.saturating_sub(5) + 1), lit(0.25));
-        along > across * (T::ONE + lit::<T>(SCATTER_DEVIATIONS) * T::TWO / sqrt(free))
+        // The logarithm of a ratio of two sums of about n squares each has the variance 2 / n + 2 / n.
+        let deviations =
+            if along > across { ln(along / across) * sqrt(from_u32(n)) * T::HALF } else { T::ZERO };
+        let unexplained = count.saturating_sub(n);
+        beyond_chance_with(unexplained, explained.others, 2, self.accident, deviations)
     }
 
     /// The rotation that explains the inliers best, by alternating between the closest rotation of all that are

@@ -80,6 +80,9 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
             let verdict = RelativePoseVerdict::Unobservable(Unobservable::TooFewDistinct);
             return Judgement { verdict, noise };
         }
+        if on_a_line(problem.data, indices, sigma, accident) {
+            return Judgement { verdict: RelativePoseVerdict::Unobservable(Unobservable::Collinear), noise };
+        }
         let evidence = Evidence { problem, inliers: mask, epipolar: refined.model.matrix(), sigma, accident };
         if let Some(rotation) = evidence.rotation(&refined.model) {
             let explained = evidence.explained(&rotation.matrix());
@@ -88,25 +91,23 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                 return self.turned(&rotation, still, sigma, mask);
             }
         }
-        if on_a_line(problem.data, indices, sigma, accident) {
-            return Judgement { verdict: RelativePoseVerdict::Unobservable(Unobservable::Collinear), noise };
-        }
-        if let Some(plane) = self.plane(indices, sigma) {
+        if let Some(plane) = self.plane(indices, sigma)
+            && 2 * evidence.explained(&plane.0).inliers > inliers
+        {
+            // A plane that holds most inliers may have led to the wrong one of its two poses.
+            let twins = self.twins(&plane);
+            for twin in &twins {
+                let other = self.refine(&pose_model(&twin.pose, problem));
+                if self.cost(&other.model) < self.cost(&refined.model) {
+                    refined = other;
+                }
+            }
+            self.mark(&refined.model, mask);
+            let epipolar = refined.model.matrix();
+            let evidence = Evidence { problem, inliers: mask, epipolar, sigma, accident };
             let explained = evidence.explained(&plane.0);
-            let planar = !evidence.proves_parallax(count, &explained, 8);
-            if planar || 2 * explained.inliers > inliers {
-                // A plane that holds most inliers may have led to the wrong one of its two poses.
-                let twins = self.twins(&plane);
-                if planar && !twins.is_empty() {
-                    return self.planar(&plane, twins, sigma, mask);
-                }
-                for twin in &twins {
-                    let other = self.refine(&pose_model(&twin.pose, problem));
-                    if self.cost(&other.model) < self.cost(&refined.model) {
-                        refined = other;
-                    }
-                }
-                self.mark(&refined.model, mask);
+            if !evidence.proves_parallax(count, &explained, 8) && !twins.is_empty() {
+                return self.planar(&plane, twins, sigma, mask);
             }
         }
         let noise = self.noise(&refined);
