@@ -15,6 +15,7 @@ pub mod robust;
 pub mod solvers;
 
 mod error;
+mod input;
 mod solutions;
 
 pub use error::InputError;

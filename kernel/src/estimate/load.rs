@@ -4,8 +4,9 @@ use nalgebra::{Matrix3, Vector2};
 
 use super::workspace::TwoViewWorkspace;
 use crate::geometry::CameraModel;
+use crate::input::{check_finite, check_lengths};
 use crate::linalg::LANES;
-use crate::real::{from_u32, is_finite, lit, sqrt};
+use crate::real::{from_u32, lit, sqrt};
 use crate::refine::blocks::{BearingBlock, Block, PlaneBlock};
 use crate::refine::relative_pose::Scales;
 use crate::{InputError, Real};
@@ -17,24 +18,13 @@ pub(super) fn check_pixels<T: Real>(
     needed: usize,
     capacity: usize,
 ) -> Result<(), InputError> {
-    if x1.len() != x2.len() {
-        return Err(InputError::LengthMismatch { first: x1.len(), second: x2.len() });
-    }
+    check_lengths(x1, x2, needed)?;
     let given = x1.len();
-    if given < needed {
-        return Err(InputError::TooFew { given, needed });
-    }
     if given > capacity {
         return Err(InputError::TooMany { given, capacity });
     }
-    for (array, points) in [x1, x2].into_iter().enumerate() {
-        for (index, point) in points.iter().enumerate() {
-            if !(is_finite(point.x) && is_finite(point.y)) {
-                return Err(InputError::NotFinite { array, index });
-            }
-        }
-    }
-    Ok(())
+    check_finite(x1, 0)?;
+    check_finite(x2, 1)
 }
 
 /// How pixels became block coordinates.

@@ -2,9 +2,9 @@
 
 use nalgebra::{Matrix3, Similarity3, Translation3, UnitQuaternion, Vector3};
 
-use super::input::check;
 use crate::geometry::Pose;
 use crate::geometry::pose::quaternion_from_matrix;
+use crate::input::check;
 use crate::linalg::svd3;
 use crate::real::{from_u32, lit};
 use crate::{InputError, Real};

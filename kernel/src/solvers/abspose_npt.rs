@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::input::check;
 use crate::geometry::Pose;
 use crate::geometry::object_space::fits;
+use crate::input::check;
 use crate::real::sqrt;
 use crate::{InputError, Real, Solutions};
 

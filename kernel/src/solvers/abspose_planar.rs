@@ -2,10 +2,10 @@
 
 use nalgebra::{Translation3, Vector2, Vector3};
 
-use super::input::check_finite;
 use crate::geometry::Pose;
 use crate::geometry::object_space::fits;
 use crate::geometry::pose::from_parts;
+use crate::input::check_finite;
 use crate::real::sqrt;
 use crate::{InputError, Real, Solutions};
 

@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::input::{check_lengths, no_solution};
 use crate::geometry::{Homography, Whitening};
+use crate::input::{check_lengths, no_solution};
 use crate::linalg::RowQr;
 use crate::real::{abs, lit, sqrt};
 use crate::{InputError, Real};

@@ -6,7 +6,6 @@ mod abspose_planar;
 mod abspose_upright_2pt;
 mod homography_4pt;
 mod homography_npt;
-mod input;
 mod p3p;
 mod relpose_5pt;
 mod relpose_7pt;

@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::input::{check_lengths, no_solution};
 use crate::geometry::{Essential, Fundamental, Whitening};
+use crate::input::{check_lengths, no_solution};
 use crate::linalg::{RowQr, null_space_refined};
 use crate::real::{lit, sqrt};
 use crate::{InputError, Real};

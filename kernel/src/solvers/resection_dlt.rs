@@ -2,9 +2,9 @@
 
 use nalgebra::{Matrix3, Matrix3x4, Vector2, Vector3};
 
-use super::input::check_finite;
 use crate::geometry::Pose;
 use crate::geometry::pose::from_parts;
+use crate::input::check_finite;
 use crate::linalg::RowQr;
 use crate::real::{from_u32, lit, sqrt};
 use crate::{InputError, Real};

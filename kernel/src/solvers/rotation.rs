@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use super::input::check;
 use crate::geometry::pose::quaternion_from_matrix;
+use crate::input::check;
 use crate::linalg::svd3;
 use crate::real::{lit, sqrt};
 use crate::{InputError, Real};

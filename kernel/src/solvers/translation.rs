@@ -2,7 +2,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::input::check;
+use crate::input::check;
 use crate::linalg::RowQr;
 use crate::real::{lit, sqrt};
 use crate::{InputError, Real};

@@ -1,14 +1,14 @@
-//! What the solvers of any number of correspondences ask of their input.
+//! What functions of any number of correspondences ask of their input.
 
-use nalgebra::{SVector, Vector3};
+use nalgebra::SVector;
 
 use crate::real::is_finite;
 use crate::{InputError, Real};
 
 /// As many points in both views, and no fewer than `needed`.
-pub(super) fn check_lengths<T: Real>(
-    x1: &[Vector3<T>],
-    x2: &[Vector3<T>],
+pub(crate) fn check_lengths<T: Real, const N: usize>(
+    x1: &[SVector<T, N>],
+    x2: &[SVector<T, N>],
     needed: usize,
 ) -> Result<(), InputError> {
     if x1.len() != x2.len() {
@@ -21,14 +21,18 @@ pub(super) fn check_lengths<T: Real>(
 }
 
 /// [`check_lengths`], and every coordinate finite: for solvers that would not fail by themselves.
-pub(super) fn check<T: Real>(x1: &[Vector3<T>], x2: &[Vector3<T>], needed: usize) -> Result<(), InputError> {
+pub(crate) fn check<T: Real, const N: usize>(
+    x1: &[SVector<T, N>],
+    x2: &[SVector<T, N>],
+    needed: usize,
+) -> Result<(), InputError> {
     check_lengths(x1, x2, needed)?;
     check_finite(x1, 0)?;
     check_finite(x2, 1)
 }
 
 /// No NaN and no infinity in the array of that number.
-pub(super) fn check_finite<T: Real, const N: usize>(
+pub(crate) fn check_finite<T: Real, const N: usize>(
     vectors: &[SVector<T, N>],
     array: usize,
 ) -> Result<(), InputError> {
@@ -43,13 +47,11 @@ pub(super) fn check_finite<T: Real, const N: usize>(
 /// Why a solver has no solution: an error where a coordinate is not finite, else degenerate points. Asked only after the
 /// solver has failed, as it does where a coordinate is not finite.
 #[cold]
-pub(super) fn no_solution<T: Real, S>(x1: &[Vector3<T>], x2: &[Vector3<T>]) -> Result<Option<S>, InputError> {
-    for (array, points) in [x1, x2].into_iter().enumerate() {
-        for (index, p) in points.iter().enumerate() {
-            if !(is_finite(p.x) && is_finite(p.y) && is_finite(p.z)) {
-                return Err(InputError::NotFinite { array, index });
-            }
-        }
-    }
+pub(crate) fn no_solution<T: Real, const N: usize, S>(
+    x1: &[SVector<T, N>],
+    x2: &[SVector<T, N>],
+) -> Result<Option<S>, InputError> {
+    check_finite(x1, 0)?;
+    check_finite(x2, 1)?;
     Ok(None)
 }
