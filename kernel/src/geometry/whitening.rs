@@ -49,13 +49,17 @@ impl<T: Real> Whitening<T> {
             yy += y * y;
         }
         let c = xy / xx;
-        let rest = yy - c * xy;
-        // What rounding of the coordinates leaves of a line's width, and of the subtraction above. Written so that NaN fails
+        let mut rest = T::ZERO;
+        for p in points {
+            let y = p.y - b * p.z - c * (p.x - a * p.z);
+            rest += y * y;
+        }
+        // The squared width of a line, against what rounding of the coordinates leaves of it. Written so that NaN fails
         // too; an infinite coordinate leaves NaN in the centred moments.
+        let width = xx * (rest / (xx + yy));
         let rounding = lit::<T>(8.0) * T::EPSILON;
         let floor = rounding * rounding * (xx + yy + (a * a + b * b + T::ONE) * zz);
-        let width = xx * (rest / (xx + yy));
-        if !(width > floor && rest > T::EPSILON * yy && zz > T::ZERO) {
+        if !(width > floor && zz > T::ZERO) {
             return None;
         }
         Some(Self {
