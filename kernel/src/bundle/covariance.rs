@@ -9,7 +9,7 @@ use super::qr::{packed_rows, rank_tolerance};
 use super::square_root::SquareRoot;
 use super::{BundleError, Window};
 use crate::Real;
-use crate::real::{abs, max};
+use crate::real::{abs, max, sqrt};
 use crate::robust::loss::Loss;
 
 /// What the window knows of a frame.
@@ -83,6 +83,10 @@ impl<T: Real> Window<'_, T> {
                 }
                 motion[(i, j)] = sum;
                 motion[(j, i)] = sum;
+            }
+            // The deviation against what it would be were all else known: not more than rounding can tell.
+            if !(sqrt(motion[(i, i)]) * columns[i] * tolerance < T::ONE) {
+                return Err(BundleError::Unobservable);
             }
         }
         let turn = Matrix3::from_fn(|i, j| rotation[i][j]);

@@ -41,14 +41,14 @@ pub struct BundleOptions<T> {
 }
 
 impl<T: Real> Default for BundleOptions<T> {
-    /// Huber's loss at 1.5 standard deviations, 20 iterations, a cost tolerance of 1e-7 (`f32`: 5e-7).
+    /// Huber's loss at 1.5 standard deviations, 20 iterations, a cost tolerance of 1e-7.
     fn default() -> Self {
         Self {
             loss: Loss::Huber(lit(1.5)),
             unknowns: Unknowns::FramesAndPoints,
             max_iterations: 20,
             max_evaluations: u32::MAX,
-            cost_tolerance: max(lit(1e-7), T::EPSILON * lit(4.0)),
+            cost_tolerance: max(lit(1e-7), T::EPSILON),
             initial_damping: lit(1e-4),
             outlier_sigma: lit(3.0),
         }

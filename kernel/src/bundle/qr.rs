@@ -61,7 +61,7 @@ pub(super) fn row_scale<T: Real>(row: &[T]) -> T {
 
 /// A pivot below this share of its column's length says that the column depends on those before it.
 pub(super) fn rank_tolerance<T: Real>(n: usize) -> T {
-    T::EPSILON * lit::<T>(4.0) * crate::real::from_u32::<T>(n as u32)
+    T::EPSILON * lit::<T>(20.0) * crate::real::from_u32::<T>(n as u32)
 }
 
 #[cfg(test)]
