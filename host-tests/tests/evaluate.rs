@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use epipole::nalgebra::{Rotation3, Vector3};
+use epipole::nalgebra::{Matrix3, Rotation3, Vector3};
 
 fn folder(name: &str) -> PathBuf {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("evaluate").join(name);
@@ -68,13 +68,15 @@ fn pooled(stdout: &str, key: &str) -> f64 {
 }
 
 #[test]
-fn relative_pose() {
+fn relative_pose_and_fundamental() {
     let folder = folder("pose");
     fs::create_dir(folder.join("scene")).unwrap();
     for k in 0..4 {
         pose_file(&folder.join(format!("scene/{k}_synthetic.txt")), k, 200);
     }
-    for (problem, scalar) in [("relative-pose", "f64"), ("relative-pose", "f32")] {
+    for (problem, scalar) in
+        [("relative-pose", "f64"), ("relative-pose", "f32"), ("fundamental", "f64"), ("fundamental", "f32")]
+    {
         let output = evaluate(
             &folder,
             &[problem, "scene", "--scalar", scalar, "--csv", "out.csv", "--plot", "out.svg", "--seed", "7"],
@@ -116,6 +118,33 @@ fn fewer_correspondences_and_iterations_are_used_when_asked() {
     // The same seed gives the same row, but for the time.
     let (a, b) = (run(&["--seed", "3"]), run(&["--seed", "3"]));
     assert_eq!((&a[..6], &a[7]), (&b[..6], &b[7]));
+}
+
+#[test]
+fn homography() {
+    let folder = folder("homography");
+    let h = Matrix3::new(0.9, 0.1, 12.0, -0.08, 1.05, -7.0, 1e-4, -5e-5, 1.0);
+    let mut state = 3;
+    let mut out = String::from("# size 640 480\n");
+    let values: Vec<String> = h.transpose().iter().map(f64::to_string).collect();
+    writeln!(out, "H_gt {}\nn 120", values.join(" ")).unwrap();
+    for k in 0..120 {
+        let x = Vector3::new(320.0 * (1.0 + random(&mut state)), 240.0 * (1.0 + random(&mut state)), 1.0);
+        let y = h * x;
+        let wrong = if k % 3 == 0 { 80.0 } else { 0.3 };
+        let mut noise = || wrong * random(&mut state);
+        // Four numbers: the order is the score.
+        writeln!(out, "{} {} {} {}", x.x, x.y, y.x / y.z + noise(), y.y / y.z + noise()).unwrap();
+    }
+    fs::write(folder.join("plane.txt"), out).unwrap();
+    for scalar in ["f64", "f32"] {
+        let output = evaluate(&folder, &["homography", "plane.txt", "--scalar", scalar, "--csv", "h.csv"]);
+        let stdout = text(&output.stdout);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        assert!(pooled(&stdout, "median_px") < 0.5, "{stdout}");
+        assert!(pooled(&stdout, "auc3") > 80.0 && pooled(&stdout, "auc10") > 80.0);
+        assert!(fs::read_to_string(folder.join("h.csv")).unwrap().starts_with("file,error_px,"));
+    }
 }
 
 #[test]

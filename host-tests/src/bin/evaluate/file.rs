@@ -4,10 +4,11 @@
 //! image 1 in pixels. The header, in any order, then the correspondences:
 //!
 //! ```text
-//! K1 fx fy cx cy          pinhole intrinsics of both images, in pixels
+//! K1 fx fy cx cy          relative pose and fundamental: pinhole intrinsics of both images, in pixels
 //! K2 fx fy cx cy
 //! R_gt r11 r12 .. r33     the true pose, row-major: x2 ~ K2 (R_gt X1 + t_gt); only t's direction counts
 //! t_gt tx ty tz
+//! H_gt h11 h12 .. h33     homography instead: x2 ~ H_gt x1
 //! n N                     then N lines
 //! x1 y1 x2 y2 score       pixels, the centre of the top-left pixel being (0, 0); lower scores are better
 //! ```
@@ -23,10 +24,18 @@ use epipole::nalgebra::{Matrix3, Vector2, Vector3};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum Problem {
     RelativePose,
+    Homography,
+    Fundamental,
 }
 
 /// The ground truth of a file.
-pub(crate) struct Truth {
+pub(crate) enum Truth {
+    Pose(TruePose),
+    Homography(Matrix3<f64>),
+}
+
+/// Pinhole cameras and `X2 = R X1 + t`, t of any length.
+pub(crate) struct TruePose {
     pub(crate) intrinsics: [[f64; 4]; 2],
     pub(crate) rotation: Matrix3<f64>,
     pub(crate) translation: Vector3<f64>,
@@ -67,17 +76,17 @@ impl std::fmt::Display for BrokenFile {
 }
 
 /// Reads a file, whole.
-pub(crate) fn read(path: &Path) -> Result<CorrespondenceFile, BrokenFile> {
+pub(crate) fn read(path: &Path, problem: Problem) -> Result<CorrespondenceFile, BrokenFile> {
     let broken = |line: usize, reason: String| BrokenFile { path: path.into(), line, reason };
     let text = fs::read_to_string(path).map_err(|e| broken(0, e.to_string()))?;
-    parse(&text)
+    parse(&text, problem)
         .map(|(size, truth, correspondences)| CorrespondenceFile { size, truth, correspondences })
         .map_err(|(line, reason)| broken(line, reason))
 }
 
 type Parsed = (Option<[f64; 2]>, Truth, Vec<Correspondence>);
 
-fn parse(text: &str) -> Result<Parsed, (usize, String)> {
+fn parse(text: &str, problem: Problem) -> Result<Parsed, (usize, String)> {
     let mut header = Header::default();
     let mut announced = None;
     let mut correspondences = Vec::new();
@@ -116,7 +125,7 @@ fn parse(text: &str) -> Result<Parsed, (usize, String)> {
     if correspondences.len() < count {
         return Err((last, format!("{} correspondences, {count} announced", correspondences.len())));
     }
-    Ok((header.size, header.truth().map_err(|reason| (0, reason))?, correspondences))
+    Ok((header.size, header.truth(problem).map_err(|reason| (0, reason))?, correspondences))
 }
 
 /// The header lines seen so far.
@@ -126,6 +135,7 @@ struct Header {
     intrinsics: [Option<[f64; 4]>; 2],
     rotation: Option<Matrix3<f64>>,
     translation: Option<Vector3<f64>>,
+    homography: Option<Matrix3<f64>>,
 }
 
 impl Header {
@@ -155,19 +165,23 @@ impl Header {
                 self.rotation = Some(r);
             }
             "t_gt" => self.translation = Some(array::<3>(rest)?.into()),
+            "H_gt" => self.homography = Some(Matrix3::from_row_slice(&array::<9>(rest)?)),
             _ => return Err(format!("unknown header `{key}`")),
         }
         Ok(())
     }
 
-    fn truth(self) -> Result<Truth, String> {
+    fn truth(self, problem: Problem) -> Result<Truth, String> {
         let need = |key: &str| format!("no line `{key}`");
+        if problem == Problem::Homography {
+            return self.homography.map(Truth::Homography).ok_or_else(|| need("H_gt"));
+        }
         let [k1, k2] = self.intrinsics;
-        Ok(Truth {
+        Ok(Truth::Pose(TruePose {
             intrinsics: [k1.ok_or_else(|| need("K1"))?, k2.ok_or_else(|| need("K2"))?],
             rotation: self.rotation.ok_or_else(|| need("R_gt"))?,
             translation: self.translation.ok_or_else(|| need("t_gt"))?,
-        })
+        }))
     }
 }
 

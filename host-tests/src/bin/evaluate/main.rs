@@ -22,17 +22,19 @@ use run::Settings;
 
 const FORMAT: &str = "\
 Format of a file, one item a line; lines that start with `#` are skipped, but `# size W H` gives the size of image 1:
-  K1 fx fy cx cy        intrinsics in pixels, no distortion
+  K1 fx fy cx cy        relative-pose and fundamental: intrinsics in pixels, no distortion
   K2 fx fy cx cy
   R_gt r11 r12 .. r33   the true pose, row-major: x2 ~ K2 (R_gt X1 + t_gt); only the direction of t_gt counts
   t_gt tx ty tz
+  H_gt h11 h12 .. h33   homography instead of the four above: x2 ~ H_gt x1
   n N                   then N lines:
   x1 y1 x2 y2 score     pixels, the centre of the top-left pixel being (0, 0); a lower score is better, and it may be
                         left out
 The correspondences are shuffled before they are used.
 
-Errors: rotation and direction of translation in degrees, by the chord. A file fails above 5 degrees; a refusal is a
-failure.
+Errors: relative-pose and fundamental (by its essential matrix), rotation and direction of translation in degrees, by
+the chord; homography, the mean distance in pixels over the part of image 1 that the truth sends into image 2. A file
+fails above 5 degrees or 10 pixels; a refusal is a failure.
 
 Exit code: 0; 1 if nothing could be evaluated; 2 for a wrong command line; 3 if some file was broken and skipped.";
 
@@ -50,7 +52,7 @@ struct Arguments {
     /// Use only the best N correspondences by score.
     #[arg(long, value_name = "N")]
     max_corr: Option<usize>,
-    /// Largest error of an inlier in pixels [default: 1, or 2 for images wider than 2000]
+    /// Largest error of an inlier in pixels [default: 3 for homographies; else 1, or 2 for images wider than 2000]
     #[arg(long, value_name = "PX", allow_negative_numbers = true)]
     threshold: Option<f64>,
     /// Probability that a sample of inliers only is drawn [default: the estimator's].
@@ -118,7 +120,7 @@ fn evaluate(arguments: &Arguments) -> Result<ExitCode, String> {
     let mut broken = 0usize;
     for path in &paths {
         progress.set_message(report::scene(path));
-        match file::read(path) {
+        match file::read(path, problem) {
             Ok(file) => {
                 let outcome = match arguments.scalar {
                     Scalar::F32 => run::run::<f32>(problem, &file, &settings),

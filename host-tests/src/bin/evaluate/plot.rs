@@ -32,7 +32,10 @@ pub(crate) fn write_svg(
         .x_label_area_size(48)
         .y_label_area_size(56)
         .build_cartesian_2d(0.0..limit, 0.0..100.0)?;
-    let axis = format!("larger error of rotation and direction of translation ({})", scale.unit);
+    let axis = match problem {
+        Problem::Homography => format!("mean transfer error ({})", scale.unit),
+        _ => format!("larger error of rotation and direction of translation ({})", scale.unit),
+    };
     chart
         .configure_mesh()
         .x_desc(axis)

@@ -22,7 +22,10 @@ pub(crate) struct Scale {
 
 pub(crate) fn scale(problem: Problem) -> Scale {
     match problem {
-        Problem::RelativePose => Scale {
+        Problem::Homography => {
+            Scale { unit: "px", thresholds: [3.0, 5.0, 10.0], fail: 10.0, medians: &["median_px"] }
+        }
+        Problem::RelativePose | Problem::Fundamental => Scale {
             unit: "deg",
             thresholds: [5.0, 10.0, 20.0],
             fail: 5.0,
@@ -98,7 +101,7 @@ pub(crate) fn print(problem: Problem, outcomes: &[(PathBuf, Outcome)]) {
 
 /// One line a file.
 pub(crate) fn write_csv(path: &Path, problem: Problem, outcomes: &[(PathBuf, Outcome)]) -> io::Result<()> {
-    let errors = "r_deg,t_deg";
+    let errors = if problem == Problem::Homography { "error_px" } else { "r_deg,t_deg" };
     let mut out = format!("file,{errors},correspondences,inliers,iterations,ms,refusal\n");
     for (file, o) in outcomes {
         let errors: Vec<String> =

@@ -1,17 +1,18 @@
 //! Errors of an estimate against the truth, and their statistics.
 
-use epipole::nalgebra::{Matrix3, Vector3};
+use epipole::nalgebra::{Matrix3, Vector2, Vector3};
 
-/// The error of a refused or failed estimate, in degrees: worse than every threshold.
+/// The error of a refused or failed estimate, in degrees or pixels: worse than every threshold.
 pub(crate) const REFUSED: f64 = f64::INFINITY;
 
-/// One file's result. The errors are rotation and direction of translation in degrees.
+/// One file's result. For a pose the errors are rotation and direction of translation in degrees; for a homography
+/// both are the mean transfer error in pixels.
 #[derive(Clone, Debug)]
 pub(crate) struct Outcome {
     pub(crate) errors: [f64; 2],
     pub(crate) correspondences: usize,
-    pub(crate) inliers: usize,
-    pub(crate) iterations: u64,
+    pub(crate) inliers: u32,
+    pub(crate) iterations: u32,
     pub(crate) milliseconds: f64,
     /// Why there is no estimate; empty where there is one.
     pub(crate) refusal: String,
@@ -33,6 +34,32 @@ pub(crate) fn rotation_error_deg(a: &Matrix3<f64>, b: &Matrix3<f64>) -> f64 {
 /// The angle between two directions in degrees, by the chord.
 pub(crate) fn direction_error_deg(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
     (2.0 * ((a.normalize() - b.normalize()).norm() / 2.0).min(1.0).asin()).to_degrees()
+}
+
+/// The mean distance in pixels between where two homographies send a grid of points of image 1; only points that
+/// `truth` sends into an image of the same size count.
+pub(crate) fn transfer_error_px(truth: &Matrix3<f64>, estimate: &Matrix3<f64>, size: [f64; 2]) -> f64 {
+    const GRID: usize = 21;
+    let centre = truth * Vector3::new(size[0] / 2.0, size[1] / 2.0, 1.0);
+    let map = |h: &Matrix3<f64>, x: &Vector3<f64>| {
+        let y = h * x;
+        (y.z, Vector2::new(y.x / y.z, y.y / y.z))
+    };
+    let (mut sum, mut count) = (0.0, 0u32);
+    for j in 0..GRID {
+        for i in 0..GRID {
+            let place = |k: usize, side: f64| k as f64 / (GRID - 1) as f64 * (side - 1.0);
+            let x = Vector3::new(place(i, size[0]), place(j, size[1]), 1.0);
+            let (depth, want) = map(truth, &x);
+            let inside = |v: f64, side: f64| (0.0..=side - 1.0).contains(&v);
+            if depth * centre.z > 0.0 && inside(want.x, size[0]) && inside(want.y, size[1]) {
+                sum += (map(estimate, &x).1 - want).norm();
+                count += 1;
+            }
+        }
+    }
+    let mean = sum / f64::from(count);
+    if mean.is_finite() { mean } else { REFUSED }
 }
 
 /// The area under the cumulative error curve up to a threshold, in percent of the threshold (trapezoids between the
@@ -91,5 +118,12 @@ mod tests {
         assert!((rotation_error_deg(&turn(0.0), &turn(1e-9)) / 1e-9f64.to_degrees() - 1.0).abs() < 1e-6);
         assert!((rotation_error_deg(&turn(0.0), &turn(3.0)) - 3f64.to_degrees()).abs() < 1e-9);
         assert!((direction_error_deg(&Vector3::x(), &Vector3::y()) - 90.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn transfer_of_a_shift() {
+        let mut shifted = Matrix3::identity();
+        shifted[(0, 2)] = 3.0;
+        assert!((transfer_error_px(&Matrix3::identity(), &shifted, [640.0, 480.0]) - 3.0).abs() < 1e-12);
     }
 }
