@@ -3,7 +3,7 @@
 use std::str::FromStr;
 
 use epipole::Real;
-use epipole::estimate::{self, RelativePoseOptions, TwoViewWorkspace};
+use epipole::estimate::{self, RelativePoseOptions, RelativePoseVerdict, TwoViewWorkspace, Unobservable};
 use epipole::geometry::triangulation::{Triangulation, ViewPair};
 use epipole::geometry::{Camera, CameraModel, Pose};
 use epipole::nalgebra::{Isometry3, Matrix3, Quaternion, UnitQuaternion, Vector2, Vector3};
@@ -27,6 +27,8 @@ pub struct TwoView {
     /// One entry a match.
     pub inliers: Vec<bool>,
     pub iterations: u32,
+    /// Whether all inliers lie on one plane; then a second pose may explain them.
+    pub planar: bool,
     /// Triangulated inliers in front of both cameras: index of the match, and the point in the frame of view 1.
     pub points: Vec<(usize, Vector3<f64>)>,
 }
@@ -62,16 +64,36 @@ pub fn estimate<T: Real>(
     let mut workspace = TwoViewWorkspace::from_slices(&mut numbers, &mut order, &mut inliers);
     let estimate = estimate::relative_pose(&camera1, &camera2, &x1, &x2, &options, &mut workspace)
         .map_err(|e| e.to_string())?;
-    let pose = estimate
-        .pose()
-        .ok_or_else(|| format!("the {} matches agree on no pose: {:?}", matches.len(), estimate.verdict))?;
+    let pose = estimate.pose().ok_or_else(|| no_pose(&estimate.verdict, matches.len()))?;
     let inliers = workspace.inliers().to_vec();
     Ok(TwoView {
         pose: widen(&pose),
         iterations: estimate.report.spent.iterations,
+        planar: matches!(estimate.verdict, RelativePoseVerdict::Planar(_)),
         points: triangulate([&camera1, &camera2], &pose, &x1, &x2, &inliers),
         inliers,
     })
+}
+
+/// Why there is no pose, in a sentence.
+fn no_pose<T: Real>(verdict: &RelativePoseVerdict<T>, matches: usize) -> String {
+    match verdict {
+        RelativePoseVerdict::PureRotation(motion) => {
+            let angle = widen(&Pose::from_parts(Vector3::zeros().into(), motion.rotation)).rotation.angle();
+            format!("the camera only turned, by {:.3} deg: no translation can be seen", angle.to_degrees())
+        }
+        RelativePoseVerdict::NoMotion => "the camera did not move".into(),
+        RelativePoseVerdict::Unobservable(Unobservable::Collinear) => {
+            "the matches lie on one line: no pose follows from them".into()
+        }
+        RelativePoseVerdict::Unobservable(_) => {
+            "the matches repeat too few distinct points for a pose".into()
+        }
+        RelativePoseVerdict::TooFewInliers => {
+            format!("too few of the {matches} matches agree to tell a pose from chance")
+        }
+        _ => format!("the {matches} matches agree on no pose"),
+    }
 }
 
 /// The pose in double precision.

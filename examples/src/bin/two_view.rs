@@ -225,6 +225,9 @@ fn print_pose(found: &TwoView, matches: usize, milliseconds: f64, truth: Option<
     let (inliers, angle) = (found.inlier_count(), found.pose.rotation.angle().to_degrees());
     println!("{inliers} inliers of {matches} matches, {} iterations, {milliseconds:.1} ms", found.iterations);
     println!("angle between the views {angle:.3} deg");
+    if found.planar {
+        println!("all inliers lie on one plane: this is the likelier of the poses that explain it");
+    }
     println!("{} of {inliers} triangulated inliers lie in front of both cameras", found.points.len());
     truth.map(|truth| {
         let r = rotation_error_deg(&pose.rotation, &truth.rotation);
