@@ -81,4 +81,11 @@ table! {
         "radians between a bearing and its point under a solution; two solutions that merge keep half the digits";
     UPRIGHT_EPIPOLAR: 2e-2, 1e-6,
         "t' (R x1 x x2) of unit vectors, at a root of the determinant; two roots that merge keep half the digits";
+    FIVE_POINT_CONSTRAINT: 1e-3, 1e-8,
+        "as ESSENTIAL_CONSTRAINT, samples of any conditioning: the last Newton step was shorter than the square root of \
+         EPSILON, its square is left over times the curvature";
+    FIVE_POINT_ROOT: 1e-3, 1e-6,
+        "distance of unit-norm E; two solutions nearer than this are one, beyond it not the same";
+    FOLDED_GRAM: 1.2e-5, 3e-14,
+        "elements of R'R relative to the trace of A'A; the rounding of nine reflections a block, 24 rows in blocks of 3";
 }

@@ -75,9 +75,7 @@ fn column<T: Real, const K: usize>(m: &mut [Cubic<T>; 10]) -> Option<T> {
         m[pivot][c] = m[K][c];
     }
     let inverse = T::ONE / row[K];
-    for c in K..20 {
-        m[K][c] = row[c];
-    }
+    m[K] = row;
     for i in K + 1..10 {
         let f = m[i][K] * inverse;
         for c in K + 1..20 {
