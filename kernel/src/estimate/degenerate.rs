@@ -193,3 +193,14 @@ pub(super) fn few_distinct<T: Real, B: EpipolarBlock<T>>(
     }
     total > 0 && used < needed as usize
 }
+
+/// Writes the indices of the set entries of a mask, in order.
+pub(super) fn list<'a>(mask: &[bool], order: &'a mut [u32]) -> &'a [u32] {
+    let mut length = 0;
+    let inliers = (0u32..).zip(mask).filter(|(_, inlier)| **inlier);
+    for (entry, (index, _)) in order.iter_mut().zip(inliers) {
+        *entry = index;
+        length += 1;
+    }
+    order.get(..length).unwrap_or(&[])
+}

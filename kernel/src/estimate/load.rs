@@ -1,12 +1,12 @@
 //! Checks of the input and its conversion into the blocks that scoring reads.
 
-use nalgebra::{Matrix3, Vector2};
+use nalgebra::Vector2;
 
 use super::workspace::TwoViewWorkspace;
 use crate::geometry::CameraModel;
 use crate::input::{check_finite, check_lengths};
 use crate::linalg::LANES;
-use crate::real::{from_u32, lit, sqrt};
+use crate::real::lit;
 use crate::refine::blocks::{BearingBlock, Block, PlaneBlock};
 use crate::refine::relative_pose::Scales;
 use crate::{InputError, Real};
@@ -107,7 +107,10 @@ fn bearing<T: Real>(camera: &impl CameraModel<T>, pixel: &Vector2<T>, pixels: T)
 }
 
 /// Writes points into blocks, four side by side; the lanes left in the last block are zero.
-fn fill<T: Real, B: Block<T>, const W: usize>(numbers: &mut [T], mut points: impl Iterator<Item = [T; W]>) {
+pub(super) fn fill<T: Real, B: Block<T>, const W: usize>(
+    numbers: &mut [T],
+    mut points: impl Iterator<Item = [T; W]>,
+) {
     for block in B::slice_mut(numbers) {
         *block = B::zero();
         for lane in 0..LANES {
@@ -115,59 +118,4 @@ fn fill<T: Real, B: Block<T>, const W: usize>(numbers: &mut [T], mut points: imp
             block.write_lane(lane, &point);
         }
     }
-}
-
-/// How pixels without a camera became block coordinates: each view about its centroid, both in one unit.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PixelUnits<T: Real> {
-    /// Pixels a unit of the blocks' coordinates.
-    pub(super) pixels: T,
-    centre1: Vector2<T>,
-    centre2: Vector2<T>,
-}
-
-impl<T: Real> PixelUnits<T> {
-    /// The map from pixels of view 1 to the blocks' coordinates.
-    pub(super) fn normaliser1(&self) -> Matrix3<T> {
-        Self::normaliser(&self.centre1, self.pixels)
-    }
-
-    /// The map from pixels of view 2 to the blocks' coordinates.
-    pub(super) fn normaliser2(&self) -> Matrix3<T> {
-        Self::normaliser(&self.centre2, self.pixels)
-    }
-
-    /// The map from the blocks' coordinates to pixels of view 2.
-    pub(super) fn pixels2(&self) -> Matrix3<T> {
-        let (c, s, o) = (&self.centre2, self.pixels, T::ZERO);
-        Matrix3::new(s, o, c.x, o, s, c.y, o, o, T::ONE)
-    }
-
-    fn normaliser(c: &Vector2<T>, pixels: T) -> Matrix3<T> {
-        let (s, o) = (T::ONE / pixels, T::ZERO);
-        Matrix3::new(s, o, -c.x * s, o, s, -c.y * s, o, o, T::ONE)
-    }
-}
-
-/// Fills plane blocks with pixels about the views' centroids, in the unit of their root mean square distance.
-pub(super) fn load_pixels<T: Real>(
-    x1: &[Vector2<T>],
-    x2: &[Vector2<T>],
-    workspace: &mut TwoViewWorkspace<'_, T>,
-) -> PixelUnits<T> {
-    let inverse = T::ONE / from_u32::<T>(x1.len() as u32);
-    let centroid = |points: &[Vector2<T>]| points.iter().fold(Vector2::zeros(), |sum, p| sum + p * inverse);
-    let (centre1, centre2) = (centroid(x1), centroid(x2));
-    let mut spread = T::ZERO;
-    for (p, q) in x1.iter().zip(x2) {
-        spread += ((p - centre1).norm_squared() + (q - centre2).norm_squared()) * T::HALF * inverse;
-    }
-    let pixels = if spread > T::ZERO { sqrt(spread) } else { T::ONE };
-    let scale = T::ONE / pixels;
-    let points = x1.iter().zip(x2).map(|(p, q)| {
-        let (p, q) = ((p - centre1) * scale, (q - centre2) * scale);
-        [p.x, p.y, q.x, q.y]
-    });
-    fill::<T, PlaneBlock<T>, 4>(workspace.numbers, points);
-    PixelUnits { pixels, centre1, centre2 }
 }

@@ -3,8 +3,8 @@
 //! | from two views | answers |
 //! |---|---|
 //! | [`relative_pose`] | the pose of view 2 in the frame of view 1, or why there is none |
-//! | [`fundamental`] | `x2' F x1 = 0` without calibration, or why there is none |
-//! | [`homography`] | `x2 ~ H x1` of a plane or a turning camera, or why there is none |
+//! | [`homography`] | the homography between two images of a plane or of a turning camera, or why there is none |
+//! | [`fundamental`] | the fundamental matrix of uncalibrated cameras, the homography of a planar scene, or why there is none |
 //!
 //! | from one view of known points | answers |
 //! |---|---|
@@ -13,6 +13,8 @@
 mod absolute_pose;
 mod chance;
 mod degenerate;
+mod error;
+mod frame;
 mod fundamental;
 mod homography;
 mod load;
@@ -25,12 +27,14 @@ pub use absolute_pose::{
     AbsolutePoseVerdict, AbsolutePoseWorkspace, GravityFit, GravityPrior, WideAbsolutePoseStorage,
     absolute_pose, absolute_pose_guided,
 };
+pub use error::TwoViewError;
 pub use fundamental::{
-    FundamentalError, FundamentalEstimate, FundamentalOptions, FundamentalVerdict, fundamental,
-    fundamental_guided,
+    FundamentalError, FundamentalEstimate, FundamentalOptions, FundamentalStorage, FundamentalVerdict,
+    FundamentalWorkspace, fundamental, fundamental_guided,
 };
 pub use homography::{
-    HomographyError, HomographyEstimate, HomographyOptions, HomographyVerdict, homography, homography_guided,
+    FoundHomography, HomographyError, HomographyEstimate, HomographyOptions, HomographyStorage,
+    HomographyVerdict, HomographyWorkspace, homography, homography_guided,
 };
 pub use relative_pose::{
     GeneralMotion, PlanarPose, PureRotation, RelativePoseError, RelativePoseEstimate, RelativePoseOptions,

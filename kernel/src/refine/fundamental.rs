@@ -1,124 +1,153 @@
-//! A fundamental matrix as the model of refinement: seven degrees of freedom.
-//!
-//! `F = U diag(cos a, sin a, 0) V'` with two rotations and an angle stays singular whatever the step.
-//!
-//! # References
-//! A. Bartoli, P. Sturm, "Nonlinear estimation of the fundamental matrix with minimal parameters", TPAMI 2004.
+//! A fundamental matrix as the model of refinement: rank 2 and length 1, seven degrees of freedom.
 
 use nalgebra::{Matrix3, SVector, Vector3};
 
 use super::lm::Manifold;
-use super::relative_pose::cayley;
 use crate::Real;
-use crate::linalg::svd3;
-use crate::real::{abs, sqrt};
+use crate::geometry::pose::tangent_basis;
+use crate::linalg::least_singular3;
+use crate::real::sqrt;
 
-/// The factors of a fundamental matrix with |F| = 1.
+/// `F` of rank 2 with |F| = 1 and its epipoles.
+///
+/// With `U = (a, b)` a basis of the plane orthogonal to `e2` and `V = (c, d)` one orthogonal to `e1`, `F = U G V'` with a
+/// 2x2 matrix `G` of length 1: three parameters for `G` and two for each epipole.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FundamentalModel<T: Real> {
-    u: Matrix3<T>,
-    v: Matrix3<T>,
-    /// The two singular values, of which the squares sum to 1.
-    s: [T; 2],
+    /// `F`.
+    pub(crate) matrix: Matrix3<T>,
+    /// The unit vector with `F e1 = 0`.
+    pub(crate) epipole1: Vector3<T>,
+    /// The unit vector with `F' e2 = 0`.
+    pub(crate) epipole2: Vector3<T>,
 }
 
 impl<T: Real> FundamentalModel<T> {
-    /// The model nearest to a matrix; none where the matrix is not finite or of rank below 2.
+    /// The nearest matrix of rank 2; none where there is no single one.
     pub(crate) fn new(f: &Matrix3<T>) -> Option<Self> {
-        let svd = svd3(f)?;
-        let size = sqrt(svd.s.x * svd.s.x + svd.s.y * svd.s.y);
-        if !(svd.s.y > T::EPSILON * svd.s.x && size > T::ZERO) {
-            return None;
-        }
-        Some(Self { u: svd.u, v: svd.v, s: [svd.s.x / size, svd.s.y / size] })
+        let (epipole2, epipole1) = least_singular3(f)?;
+        Self::project(f, &epipole1, &epipole2)
     }
 
-    fn product(&self, s: [T; 2]) -> Matrix3<T> {
-        let (u, v) = (&self.u, &self.v);
-        (u.column(0) * v.column(0).transpose()) * s[0] + (u.column(1) * v.column(1).transpose()) * s[1]
+    /// The part of a matrix that has the given epipoles, at length 1.
+    fn project(f: &Matrix3<T>, epipole1: &Vector3<T>, epipole2: &Vector3<T>) -> Option<Self> {
+        let f = f - (f * epipole1) * epipole1.transpose();
+        let f = f - epipole2 * f.tr_mul(epipole2).transpose();
+        let size = sqrt(f.norm_squared());
+        let usable = size > T::ZERO && size <= T::MAX;
+        usable.then(|| Self { matrix: f * (T::ONE / size), epipole1: *epipole1, epipole2: *epipole2 })
+    }
+
+    fn bases(&self) -> [[Vector3<T>; 2]; 2] {
+        [self.epipole1, self.epipole2].map(|e| {
+            let basis = tangent_basis(&e);
+            [basis.column(0).into_owned(), basis.column(1).into_owned()]
+        })
+    }
+
+    /// The derivatives of `F` by `G` (three directions orthogonal to it), `e1` and `e2`.
+    fn directions(&self, [[c, d], [a, b]]: &[[Vector3<T>; 2]; 2]) -> [Matrix3<T>; 7] {
+        let (fc, fd) = (self.matrix * c, self.matrix * d);
+        let (fa, fb) = (self.matrix.tr_mul(a), self.matrix.tr_mul(b));
+        let g = [a.dot(&fc), a.dot(&fd), b.dot(&fc), b.dot(&fd)];
+        let outer = |g: [T; 4]| a * (c * g[0] + d * g[1]).transpose() + b * (c * g[2] + d * g[3]).transpose();
+        let (e1, e2) = (self.epipole1.transpose(), &self.epipole2);
+        [
+            outer([-g[1], g[0], -g[3], g[2]]),
+            outer([-g[2], g[3], g[0], -g[1]]),
+            outer([-g[3], -g[2], g[1], g[0]]),
+            -(fc * e1),
+            -(fd * e1),
+            -(e2 * fa.transpose()),
+            -(e2 * fb.transpose()),
+        ]
     }
 }
 
 impl<T: Real> Manifold<T, 7> for FundamentalModel<T> {
+    #[inline]
     fn matrix(&self) -> Matrix3<T> {
-        self.product(self.s)
+        self.matrix
     }
 
     fn tangents(&self) -> [[T; 9]; 7] {
-        let f = self.matrix();
         let mut result = [[T::ZERO; 9]; 7];
-        let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
-        let row_major = |m: &Matrix3<T>| {
-            let m = &m.data.0;
-            [m[0][0], m[1][0], m[2][0], m[0][1], m[1][1], m[2][1], m[0][2], m[1][2], m[2][2]]
-        };
-        for (k, axis) in axes.iter().enumerate() {
-            let skew = crate::geometry::pose::skew::<T>(axis);
-            result[k] = row_major(&(skew * f));
-            result[3 + k] = row_major(&(f * -skew));
+        for (tangent, direction) in result.iter_mut().zip(self.directions(&self.bases())) {
+            for (row, entries) in direction.transpose().data.0.iter().zip(tangent.as_chunks_mut::<3>().0) {
+                *entries = *row;
+            }
         }
-        result[6] = row_major(&self.product([-self.s[1], self.s[0]]));
         result
     }
 
     fn retract(&self, step: &SVector<T, 7>) -> Self {
-        let d = &step.data.0[0];
-        let [a, b] = self.s;
-        let turned = [a - b * d[6], b + a * d[6]];
-        let size = T::ONE / sqrt(turned[0] * turned[0] + turned[1] * turned[1]);
-        Self {
-            u: cayley(&Vector3::new(d[0], d[1], d[2])) * self.u,
-            v: cayley(&Vector3::new(d[3], d[4], d[5])) * self.v,
-            s: [turned[0] * size, turned[1] * size],
-        }
+        let s = &step.data.0[0];
+        let bases = self.bases();
+        let directions = self.directions(&bases);
+        let moved = self.matrix + directions[0] * s[0] + directions[1] * s[1] + directions[2] * s[2];
+        let moved = moved + directions[3] * s[3] + directions[4] * s[4];
+        let moved = moved + directions[5] * s[5] + directions[6] * s[6];
+        let unit = |e: Vector3<T>| e * (T::ONE / sqrt(e.norm_squared()));
+        let [[c, d], [a, b]] = bases;
+        let epipole1 = unit(self.epipole1 + c * s[3] + d * s[4]);
+        let epipole2 = unit(self.epipole2 + a * s[5] + b * s[6]);
+        // A step too large for any matrix to be left leaves the model where it is.
+        Self::project(&moved, &epipole1, &epipole2).unwrap_or(*self)
     }
-}
-
-/// True where every point of a sample lies on the same side in the oriented epipolar sense: with `e` the epipole of
-/// view 2, `e x x2` and `F x1` point the same way for all or the opposite way for all.
-///
-/// # References
-/// O. Chum, T. Werner, J. Matas, "Epipolar geometry estimation via RANSAC benefits from the oriented epipolar
-/// constraint", ICPR 2004.
-pub(crate) fn oriented<T: Real>(f: &Matrix3<T>, x1: &[Vector3<T>], x2: &[Vector3<T>]) -> bool {
-    let columns = [f.column(0).into_owned(), f.column(1).into_owned(), f.column(2).into_owned()];
-    let products =
-        [columns[1].cross(&columns[2]), columns[2].cross(&columns[0]), columns[0].cross(&columns[1])];
-    let mut e = products[0];
-    for p in &products[1..] {
-        if p.norm_squared() > e.norm_squared() {
-            e = *p;
-        }
-    }
-    let (mut positive, mut negative) = (false, false);
-    for (a, b) in x1.iter().zip(x2) {
-        let side = e.cross(b).dot(&(f * a));
-        positive |= side > T::ZERO;
-        negative |= side < T::ZERO || abs(side) > T::MAX;
-    }
-    !(positive && negative)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::refine::blocks::{BlockSlice, PlaneBlock};
+    use crate::refine::lm::normal_equations;
+    use crate::robust::loss::Loss;
+
+    fn model() -> FundamentalModel<f64> {
+        FundamentalModel::new(&Matrix3::new(0.3, -0.2, 0.5, 0.1, 0.4, -0.7, -0.6, 0.8, 0.2)).unwrap()
+    }
 
     #[test]
-    fn tangents_agree_with_central_differences() {
-        let m = Matrix3::<f64>::new(0.3, -0.7, 0.2, 0.9, 0.1, -0.4, 0.5, -0.6, 0.8);
-        let model = FundamentalModel::new(&m).unwrap();
-        assert!(model.matrix().determinant().abs() < 1e-15);
-        for (k, tangent) in model.tangents().iter().enumerate() {
-            let moved = |h: f64| {
-                let mut step = SVector::<f64, 7>::zeros();
-                step[k] = h;
-                model.retract(&step).matrix()
-            };
-            let slope = (moved(1e-6) - moved(-1e-6)) / 2e-6;
-            for i in 0..3 {
-                for j in 0..3 {
-                    assert!((slope[(i, j)] - tangent[3 * i + j]).abs() < 1e-9, "{k}");
-                }
+    fn the_model_keeps_rank_and_length_in_any_step() {
+        let step = SVector::<f64, 7>::from_fn(|i, _| 0.3 * (i as f64 + 1.0).sin());
+        for model in [model(), model().retract(&step)] {
+            assert!((model.matrix.norm() - 1.0).abs() < 1e-14);
+            assert!((model.matrix * model.epipole1).norm() < 1e-14);
+            assert!((model.matrix.transpose() * model.epipole2).norm() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn tangents_are_orthogonal_to_the_scale_and_agree_with_differences() {
+        let model = model();
+        for (p, tangent) in model.tangents().iter().enumerate() {
+            let tangent = Matrix3::from_row_slice(tangent);
+            assert!(tangent.dot(&model.matrix).abs() < 1e-14);
+            let mut step = SVector::<f64, 7>::zeros();
+            step[p] = 1e-6;
+            let difference = (model.retract(&step).matrix - model.retract(&-step).matrix) / 2e-6;
+            assert!((difference - tangent).norm() < 1e-9, "{p}: {difference} {tangent}");
+        }
+    }
+
+    #[test]
+    fn sums_agree_with_central_differences() {
+        let mut blocks: [PlaneBlock<f64>; 3] = [[[0.0; 4]; 4]; 3];
+        for (i, x) in blocks.iter_mut().flatten().flatten().enumerate() {
+            *x = ((i * i) as f64 * 0.7).sin();
+        }
+        let (model, data) = (model(), BlockSlice { blocks: &blocks, count: 11 });
+        for loss in [Loss::Squared, Loss::Tukey(3.0)] {
+            let sums = normal_equations::<_, _, _, 7>(data, &model, &loss);
+            for p in 0..7 {
+                let h = 1e-6;
+                let moved = |h: f64| {
+                    let mut step = SVector::<f64, 7>::zeros();
+                    step[p] = h;
+                    normal_equations::<_, _, _, 7>(data, &model.retract(&step), &loss).cost
+                };
+                let slope = (moved(h) - moved(-h)) / (4.0 * h);
+                assert!((slope - sums.gradient[p]).abs() < 1e-7, "{p} {loss:?} {slope} {}", sums.gradient[p]);
             }
         }
     }

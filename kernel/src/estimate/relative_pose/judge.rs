@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::super::chance::{EXPLAINED_SIGMAS, beyond_chance, line_accident};
-use super::super::degenerate::{few_distinct, on_a_line};
+use super::super::degenerate::{few_distinct, list, on_a_line};
 use super::covariance::{covariance, variance};
 use super::evidence::{Evidence, Explained};
 use super::hypothesis::PoseProblem;
@@ -223,15 +223,4 @@ pub(super) fn pose_model<T: Real, B>(pose: &Pose<T>, problem: &PoseProblem<'_, T
         translation: pose.translation.vector,
         scales: problem.scales,
     }
-}
-
-/// Writes the indices of the set entries of a mask, in order.
-fn list<'a>(mask: &[bool], order: &'a mut [u32]) -> &'a [u32] {
-    let mut length = 0;
-    let inliers = (0u32..).zip(mask).filter(|(_, inlier)| **inlier);
-    for (entry, (index, _)) in order.iter_mut().zip(inliers) {
-        *entry = index;
-        length += 1;
-    }
-    order.get(..length).unwrap_or(&[])
 }

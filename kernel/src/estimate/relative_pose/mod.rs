@@ -1,17 +1,16 @@
 //! The relative pose of two calibrated views.
 
-use core::fmt;
-
 use nalgebra::Vector2;
 
+use super::error::TwoViewError;
 use super::load::{Units, check_pixels, load_bearings, load_planes};
 use super::workspace::RelativePoseWorkspace;
+use crate::Real;
 use crate::geometry::CameraModel;
 use crate::linalg::LANES;
 use crate::refine::blocks::{BearingBlock, BlockSlice, EpipolarBlock, PlaneBlock};
 use crate::robust::budget::check_noise;
-use crate::robust::{Guide, OptionsError, RansacOptions, rank_by_score, ransac};
-use crate::{InputError, Real};
+use crate::robust::{Guide, RansacOptions, rank_by_score, ransac};
 
 mod covariance;
 mod evidence;
@@ -44,39 +43,8 @@ impl<T: Real> Default for RelativePoseOptions<T> {
     }
 }
 
-/// Malformed input or options. Outputs are untouched.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum RelativePoseError {
-    /// The correspondences cannot be used.
-    Input(InputError),
-    /// An option is out of its range.
-    Options(OptionsError),
-}
-
-impl fmt::Display for RelativePoseError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Input(error) => error.fmt(f),
-            Self::Options(error) => error.fmt(f),
-        }
-    }
-}
-
-impl core::error::Error for RelativePoseError {}
-
-impl From<InputError> for RelativePoseError {
-    fn from(error: InputError) -> Self {
-        Self::Input(error)
-    }
-}
-
-impl From<OptionsError> for RelativePoseError {
-    fn from(error: OptionsError) -> Self {
-        Self::Options(error)
-    }
-}
+/// Malformed input or options of [`relative_pose`].
+pub type RelativePoseError = TwoViewError;
 
 /// The pose of view 2 in the frame of view 1 from pixel correspondences, many of which may be wrong, or why there is
 /// none.

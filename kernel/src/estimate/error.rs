@@ -1,0 +1,40 @@
+//! Malformed input or options of a two-view estimator.
+
+use core::fmt;
+
+use crate::InputError;
+use crate::robust::OptionsError;
+
+/// Malformed input or options. Outputs are untouched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum TwoViewError {
+    /// The correspondences cannot be used.
+    Input(InputError),
+    /// An option is out of its range.
+    Options(OptionsError),
+}
+
+impl fmt::Display for TwoViewError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Input(error) => error.fmt(f),
+            Self::Options(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for TwoViewError {}
+
+impl From<InputError> for TwoViewError {
+    fn from(error: InputError) -> Self {
+        Self::Input(error)
+    }
+}
+
+impl From<OptionsError> for TwoViewError {
+    fn from(error: OptionsError) -> Self {
+        Self::Options(error)
+    }
+}

@@ -1,0 +1,252 @@
+//! The homography between two images of a plane, or of a camera that only turned.
+
+use nalgebra::Vector2;
+
+use super::chance::{beyond_chance, point_accident};
+use super::degenerate::{few_distinct, list, on_a_line};
+use super::error::TwoViewError;
+use super::frame::PixelFrame;
+use super::load::check_pixels;
+use super::relative_pose::Unobservable;
+use super::transfer::TransferProblem;
+use super::workspace::{TwoViewStorage, TwoViewWorkspace};
+use crate::Real;
+use crate::linalg::LANES;
+use crate::real::{lit, max, sqrt};
+use crate::refine::blocks::{Block, BlockSlice, EpipolarBlock, PlaneBlock};
+use crate::refine::homography::{HomographyModel, transfer_sq};
+use crate::robust::budget::check_noise;
+use crate::robust::loss::Loss;
+use crate::robust::{Guide, RansacOptions, rank_by_score, ransac};
+
+mod covariance;
+mod verdict;
+
+use covariance::{Scatter, corners, covariance, to_pixels};
+pub use verdict::{FoundHomography, HomographyEstimate, HomographyVerdict};
+
+/// Malformed input or options of [`homography`].
+pub type HomographyError = TwoViewError;
+
+/// The memory of [`homography`].
+pub type HomographyStorage<T, const N: usize> = TwoViewStorage<T, N>;
+
+/// The workspace of [`homography`].
+pub type HomographyWorkspace<'a, T> = TwoViewWorkspace<'a, T>;
+
+/// Options of [`homography`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct HomographyOptions<T> {
+    /// Largest error of an inlier, pixels: the first-order distance of the correspondence, four coordinates, from the
+    /// homography. Where the images have one scale, the distance between transferred and measured point is sqrt 2 times
+    /// that. Default 3.
+    pub max_error_px: T,
+    /// Standard deviation of the noise of one image coordinate, pixels. Default: half of `max_error_px`.
+    pub sigma_px: Option<T>,
+    /// Confidence, iterations, budgets and seed.
+    pub ransac: RansacOptions<T>,
+}
+
+impl<T: Real> Default for HomographyOptions<T> {
+    fn default() -> Self {
+        Self { max_error_px: lit(3.0), sigma_px: None, ransac: RansacOptions::default() }
+    }
+}
+
+/// The homography `x2 ~ H x1` of pixel correspondences, many of which may be wrong, or why there is none.
+///
+/// Minimises over `H` the sum of a robust loss of `e' (I + J J')^-1 e`, with the transfer error
+/// `e = h(x1) - x2` in view 2 and `J` the Jacobian of `h` (Sampson's approximation of the reprojection error in both views).
+///
+/// # Input
+/// Pixels of two images, not corrected for a lens beyond a pinhole: `x1[i]` corresponds to `x2[i]`, at least 4.
+///
+/// # Returns
+/// A verdict, the noise, a report; in the workspace the inlier mask.
+///
+/// # Errors
+/// [`HomographyError`]; workspace and mask are untouched.
+///
+/// # Degeneracies
+/// All inliers on one line, or repetitions of fewer than four distinct points, but for as few as chance explains:
+/// [`HomographyVerdict::Unobservable`].
+///
+/// # Accuracy
+/// That of the maximum-likelihood estimate from the inliers to within a few percent. Coordinates are counted from the middle of
+/// the points in units of their spread, so that `f32` answers as `f64` does.
+///
+/// # Cost
+/// At most [`Budget::max_iterations`](crate::robust::Budget) samples of four, and one local optimisation of at most 10 passes over the
+/// correspondences for each that leads.
+///
+/// # References
+/// M. Fischler, R. Bolles, "Random sample consensus", Communications of the ACM, 1981; O. Chum, T. Pajdla, P. Sturm, "The
+/// geometric error for homographies", Computer Vision and Image Understanding, 2005 (the error); P. Huber, "Robust Statistics", 1981, section
+/// 6.3 (the covariance of an M-estimate).
+///
+/// # Examples
+/// ```
+/// use epipole::estimate::{HomographyOptions, HomographyStorage, homography};
+/// use epipole::nalgebra::{Matrix3, Vector2, Vector3};
+///
+/// let truth = Matrix3::new(1.1, 0.1, 20.0, -0.2, 0.9, 30.0, 1e-4, -2e-4, 1.0);
+/// let (mut x1, mut x2) = ([Vector2::zeros(); 60], [Vector2::zeros(); 60]);
+/// for k in 0..60 {
+///     let i = k as f64;
+///     x1[k] = Vector2::new((i * 97.0) % 640.0, (i * 53.0) % 480.0);
+///     let y = truth * Vector3::new(x1[k].x, x1[k].y, 1.0);
+///     x2[k] = Vector2::new(y.x / y.z, y.y / y.z);
+///     if k % 3 == 0 {
+///         x2[k] = Vector2::new((i * 77.0) % 640.0, (i * 31.0) % 480.0); // A wrong match.
+///     }
+/// }
+/// let mut storage = HomographyStorage::<f64, 60>::new();
+/// let mut workspace = storage.workspace();
+/// let estimate = homography(&x1, &x2, &HomographyOptions::default(), &mut workspace).unwrap();
+/// let h = estimate.homography().unwrap().0;
+/// assert!((h / h[(2, 2)] - truth).norm() < 1e-6);
+/// assert!(!workspace.inliers()[3] && workspace.inliers()[1]);
+/// ```
+pub fn homography<T: Real>(
+    x1: &[Vector2<T>],
+    x2: &[Vector2<T>],
+    options: &HomographyOptions<T>,
+    workspace: &mut HomographyWorkspace<'_, T>,
+) -> Result<HomographyEstimate<T>, HomographyError> {
+    homography_guided(x1, x2, options, Guide::none(), workspace)
+}
+
+/// [`homography`], with match scores for ordered sampling, or with a caller's "may I go on?".
+pub fn homography_guided<T: Real>(
+    x1: &[Vector2<T>],
+    x2: &[Vector2<T>],
+    options: &HomographyOptions<T>,
+    guide: Guide<'_, T>,
+    workspace: &mut HomographyWorkspace<'_, T>,
+) -> Result<HomographyEstimate<T>, HomographyError> {
+    let sigma_px = check_noise(options.max_error_px, options.sigma_px)?;
+    options.ransac.check()?;
+    check_pixels(x1, x2, 4, workspace.capacity())?;
+    guide.check(x1.len())?;
+    let frame = PixelFrame::load(x1, x2, options.max_error_px, workspace);
+    let count = x1.len();
+    let blocks = PlaneBlock::slice(workspace.numbers);
+    let blocks = blocks.get(..count.div_ceil(LANES)).unwrap_or(blocks);
+    let problem = TransferProblem {
+        data: BlockSlice { blocks, count },
+        threshold: options.max_error_px / frame.pixels,
+        subset: None,
+    };
+    let order = match guide.scores {
+        Some(scores) => {
+            rank_by_score(scores, workspace.order);
+            workspace.order.get(..count)
+        }
+        None => None,
+    };
+    let consensus = ransac(&problem, &options.ransac, order, LEAST_INLIERS, guide.keep_going);
+    let mut report = consensus.report;
+    let judge = Judge { problem: &problem, sigma: sigma_px / frame.pixels, frame: &frame };
+    let mask = workspace.inliers.get_mut(..count).unwrap_or_default();
+    let (verdict, noise) = match &consensus.models[0] {
+        Some((model, _)) => judge.verdict(model, mask, workspace.order),
+        None => (judge.without_model(mask, workspace.order), T::ZERO),
+    };
+    report.inliers = mask.iter().map(|&inlier| inlier as u32).sum();
+    Ok(HomographyEstimate { verdict, noise_px: noise * frame.pixels, report })
+}
+
+/// The smallest consensus of interest to the search; the verdict asks for more where chance demands it.
+const LEAST_INLIERS: u32 = 8;
+
+/// Passes over the data of the last refinement.
+const FINAL_PASSES: u32 = 8;
+
+struct Judge<'a, 'b, T: Real> {
+    problem: &'a TransferProblem<'b, T, PlaneBlock<T>>,
+    /// Standard deviation of a coordinate in the blocks' unit, as the options have it.
+    sigma: T,
+    frame: &'a PixelFrame<T>,
+}
+
+impl<T: Real> Judge<'_, '_, T> {
+    /// The chance of a wrong correspondence to be an inlier: in view 2 it is one within sqrt 2 thresholds.
+    fn accident(&self) -> T {
+        point_accident(self.problem.data, self.problem.threshold * lit(core::f64::consts::SQRT_2))
+    }
+
+    /// The verdict where no homography explains more than chance does.
+    fn without_model(&self, mask: &mut [bool], order: &mut [u32]) -> HomographyVerdict<T> {
+        mask.iter_mut().for_each(|inlier| *inlier = true);
+        let data = self.problem.data;
+        let count = data.count as u32;
+        let accident = self.accident();
+        let all = list(mask, order);
+        let verdict = if !beyond_chance(count, count, 4, accident) {
+            HomographyVerdict::TooFewInliers
+        } else if few_distinct(data, all.iter().copied(), 4, self.sigma, accident) {
+            HomographyVerdict::Unobservable(Unobservable::TooFewDistinct)
+        } else if on_a_line(data, all, self.sigma, accident) {
+            HomographyVerdict::Unobservable(Unobservable::Collinear)
+        } else {
+            HomographyVerdict::NoConsensus
+        };
+        mask.iter_mut().for_each(|inlier| *inlier = false);
+        verdict
+    }
+
+    /// The verdict on the best homography, and the noise in the blocks' unit; writes the inlier mask.
+    fn verdict(
+        &self,
+        best: &HomographyModel<T>,
+        mask: &mut [bool],
+        order: &mut [u32],
+    ) -> (HomographyVerdict<T>, T) {
+        let problem = self.problem;
+        let data = problem.data;
+        // What lies just beyond the threshold takes part at a falling weight.
+        let support = problem.threshold * T::TWO;
+        let minimum = problem.optimise(best, &Loss::Tukey(support), FINAL_PASSES, lit(1e-6));
+        let Some(model) = HomographyModel::new(&minimum.model.0) else {
+            return (self.without_model(mask, order), T::ZERO);
+        };
+        let inliers = self.mark(&model, mask);
+        let accident = self.accident();
+        if !beyond_chance(data.count as u32, inliers, 4, accident) {
+            return (self.without_model(mask, order), T::ZERO);
+        }
+        let scatter = Scatter::new(data, &model, support);
+        let noise = sqrt(scatter.variance());
+        let sigma = max(self.sigma, noise);
+        let indices = list(mask, order);
+        if few_distinct(data, indices.iter().copied(), 4, sigma, accident) {
+            return (HomographyVerdict::Unobservable(Unobservable::TooFewDistinct), noise);
+        }
+        if on_a_line(data, indices, sigma, accident) {
+            return (HomographyVerdict::Unobservable(Unobservable::Collinear), noise);
+        }
+        let corners = corners(data, &model, mask);
+        let found = FoundHomography {
+            homography: self.frame.homography(&model.0),
+            corners: corners.map(|corner| to_pixels(self.frame, corner)),
+            covariance: covariance(&model, &minimum.equations, &scatter, &corners, self.frame),
+        };
+        (HomographyVerdict::Found(found), noise)
+    }
+
+    /// Writes the inliers and counts them.
+    fn mark(&self, model: &HomographyModel<T>, mask: &mut [bool]) -> u32 {
+        let limit = self.problem.threshold * self.problem.threshold;
+        let mut entries = mask.iter_mut();
+        let mut inliers = 0;
+        for block in self.problem.data.blocks {
+            let (plane, weight) = block.planes();
+            for (&s, inlier) in transfer_sq(&model.0, &plane, &weight).iter().zip(entries.by_ref()) {
+                *inlier = s < limit;
+                inliers += *inlier as u32;
+            }
+        }
+        inliers
+    }
+}
