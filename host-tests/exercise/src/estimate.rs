@@ -2,8 +2,11 @@
 
 use epipole::Real;
 use epipole::estimate::{
-    RelativePoseEstimate, RelativePoseOptions, RelativePoseVerdict, TwoViewStorage, TwoViewWorkspace,
-    WideTwoViewStorage, relative_pose, relative_pose_guided,
+    AbsolutePoseOptions, AbsolutePoseStorage, AbsolutePoseVerdict, AbsolutePoseWorkspace, FundamentalOptions,
+    GravityPrior, HomographyOptions, HomographyVerdict, RelativePoseEstimate, RelativePoseOptions,
+    RelativePoseVerdict, TwoViewStorage, TwoViewWorkspace, WideAbsolutePoseStorage, WideTwoViewStorage,
+    absolute_pose, absolute_pose_guided, fundamental, fundamental_guided, homography, homography_guided,
+    relative_pose, relative_pose_guided,
 };
 use epipole::geometry::{Camera, CameraModel};
 use epipole::nalgebra::Vector2;
@@ -115,6 +118,127 @@ pub(crate) fn two_view_relative_pose<T: Real>(source: &mut Source<'_>, sink: &mu
             let n = source.below(100);
             let numbers = numbers.get_mut(..n).unwrap_or(&mut []);
             relative(source, sink, &mut TwoViewWorkspace::from_slices(numbers, &mut order, &mut inliers));
+        }
+    }
+}
+
+pub(crate) fn two_view_matrices<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
+    let (Some(camera1), Some(camera2)) = (any_camera_model::<T>(source), any_camera_model::<T>(source))
+    else {
+        return;
+    };
+    let (x1, x2) = pixels(source, &camera1, &camera2);
+    let n = source.below(N + 4);
+    let (x1, x2) = (x1.get(..n).unwrap_or(&x1), x2.get(..n).unwrap_or(&x2));
+    let mut storage = TwoViewStorage::<T, N>::new();
+    let mut workspace = storage.workspace();
+    let mut options = FundamentalOptions::default();
+    options.ransac = any_options(source);
+    let scores = source.array::<T, N>();
+    let guide = || Guide { scores: scores.get(..x1.len()), keep_going: None };
+    for estimate in [
+        fundamental(x1, x2, &options, &mut workspace),
+        fundamental_guided(x1, x2, &options, guide(), &mut workspace),
+    ]
+    .iter()
+    .flatten()
+    {
+        sink.finite(&[estimate.noise_px]);
+        if let Some(f) = estimate.fundamental() {
+            sink.finite(&f.0);
+        }
+    }
+    let mut options = HomographyOptions::default();
+    options.ransac = any_options(source);
+    for estimate in [
+        homography(x1, x2, &options, &mut workspace),
+        homography_guided(x1, x2, &options, guide(), &mut workspace),
+    ]
+    .iter()
+    .flatten()
+    {
+        sink.finite(&[estimate.noise_px]);
+        if let HomographyVerdict::Found { homography, covariance } = &estimate.verdict {
+            sink.finite(&homography.0);
+            sink.finite(covariance.iter().flatten());
+        }
+        sink.flag(estimate.homography().is_some());
+    }
+    for &inlier in workspace.inliers() {
+        sink.flag(inlier);
+    }
+}
+
+fn pose_of_points<T: Real>(
+    source: &mut Source<'_>,
+    sink: &mut Sink,
+    workspace: &mut AbsolutePoseWorkspace<'_, T>,
+) {
+    let Some(camera) = any_camera_model::<T>(source) else { return };
+    let mut points = source.vectors::<T, N>();
+    let (mut x, _) = pixels(source, &camera, &camera);
+    if source.below(4) > 0 {
+        let pose = source.pose::<T>();
+        let flat = source.below(3) == 0;
+        for (pixel, point) in x.iter_mut().zip(&mut points) {
+            if flat {
+                point.z = T::ZERO;
+            }
+            let inside = pose.rotation * *point + pose.translation.vector;
+            if let Some(seen) = camera.project(&inside) {
+                *pixel = seen;
+            }
+        }
+    }
+    let n = source.below(N + 4);
+    let (x, points) = (x.get(..n).unwrap_or(&x), points.get(..n).unwrap_or(&points));
+    let mut options = AbsolutePoseOptions::default();
+    options.ransac = any_options(source);
+    if source.below(2) == 0 {
+        let [world, camera] = source.vectors();
+        options.gravity = Some(GravityPrior { world, camera, sigma_rad: source.positive() });
+    }
+    sink.count(workspace.capacity() + workspace.wide_capacity());
+    let scores = source.array::<T, N>();
+    let guide = Guide { scores: scores.get(..x.len()), keep_going: None };
+    for estimate in [
+        absolute_pose(&camera, x, points, &options, workspace),
+        absolute_pose_guided(&camera, x, points, &options, guide, workspace),
+    ]
+    .iter()
+    .flatten()
+    {
+        sink.finite(&[estimate.noise_px]);
+        sink.flag(estimate.pose().is_some());
+        let found: &[_] = match &estimate.verdict {
+            AbsolutePoseVerdict::Pose(pose) => core::slice::from_ref(pose),
+            AbsolutePoseVerdict::PlanarAmbiguity(poses) => poses,
+            _ => &[],
+        };
+        for found in found {
+            sink.finite_pose(&found.pose);
+            sink.finite(found.covariance.iter().flatten());
+            sink.finite(&[found.rms_px]);
+        }
+    }
+    for &inlier in workspace.inliers() {
+        sink.flag(inlier);
+    }
+}
+
+pub(crate) fn absolute<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
+    match source.below(3) {
+        0 => pose_of_points(source, sink, &mut AbsolutePoseStorage::<T, N>::new().workspace()),
+        1 => pose_of_points(source, sink, &mut WideAbsolutePoseStorage::<T, N>::new().workspace()),
+        _ => {
+            let (mut numbers, mut order, mut inliers) = ([T::ZERO; 200], [0; 30], [false; 25]);
+            let n = source.below(200);
+            let numbers = numbers.get_mut(..n).unwrap_or(&mut []);
+            pose_of_points(
+                source,
+                sink,
+                &mut AbsolutePoseWorkspace::from_slices(numbers, &mut order, &mut inliers),
+            );
         }
     }
 }

@@ -28,6 +28,9 @@ pub(crate) fn rotations<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
     let (w, v) = (source.vector3::<T>(), source.vector3::<T>());
     let q = source.rotation::<T>();
     sink.numbers(&p::exp(&w).coords);
+    if let Some(turn) = p::upright(&w) {
+        sink.finite(&turn);
+    }
     sink.finite(&p::log(&q));
     sink.numbers(&p::left_jacobian(&w));
     sink.numbers(&p::skew(&w));

@@ -44,8 +44,8 @@ pub const CAPABILITIES: &[Capability] = capabilities! {
     linalg: scalar null_space row_qr lu ldlt symmetric_eigen svd3 polynomials;
     geometry: pose rotations pinhole brown_conrady kannala_brandt any_camera residuals two_view_triangulation
         many_view_triangulation essential homography fundamental;
-    solvers: relpose_5pt relpose_7pt relpose_8pt homography;
+    solvers: relpose_5pt relpose_7pt relpose_8pt homography absolute_minimal absolute_linear partial_motions;
     robust: losses sampling_and_stopping scoring engine;
     bundle: window random_calls;
-    estimate: two_view_relative_pose;
+    estimate: two_view_relative_pose two_view_matrices absolute;
 };

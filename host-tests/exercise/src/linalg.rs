@@ -17,6 +17,8 @@ pub(crate) fn null_space<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
     let basis = linalg::null_space::<T, 5, 9, 4>(&source.rows());
     sink.flag(basis.is_some());
     sink.finite(basis.iter().flatten().flatten());
+    let refined = linalg::null_space_refined::<T, 7, 9, 2>(&source.rows());
+    sink.finite(refined.iter().flatten().flatten());
     let vector = linalg::null_space::<T, 8, 9, 1>(&source.rows());
     sink.finite(vector.iter().flatten().flatten());
 }
@@ -78,6 +80,10 @@ pub(crate) fn polynomials<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
     let roots = linalg::poly::projective_roots_10(&source.array::<T, 11>(), T::EPSILON);
     sink.count(roots.len());
     sink.numbers(roots.iter().flat_map(|chart| chart.as_slice()));
+    let roots = linalg::poly::real_roots_10(&source.array::<T, 11>(), T::EPSILON);
+    sink.numbers(roots.as_slice());
+    let worst = roots.least_determined();
+    sink.numbers(&[worst.x, worst.spread]);
     let roots = linalg::cubic_roots(&source.array::<T, 4>());
     sink.count(roots.len());
     sink.finite(roots.iter());

@@ -72,6 +72,8 @@ pub(crate) fn scoring<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
     ] {
         sink.flag(gate.rejects(tally.cost(), tally.inliers(), source.scalar()));
     }
+    let mut list = epipole::Solutions::<T, 2>::new();
+    sink.flag(list.push(tally.cost()));
     sink.flag(Score::<T>::worst().cost > score.cost);
 }
 

@@ -75,3 +75,83 @@ pub(crate) fn homography<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
         sink.finite(&h.0);
     }
 }
+
+/// Bearings of points seen by a camera: any, or under a pose.
+fn seen<T: Real, const N: usize>(source: &mut Source<'_>, points: &[Vector3<T>; N]) -> [Vector3<T>; N] {
+    if source.below(4) == 0 {
+        return source.vectors();
+    }
+    let pose = source.pose::<T>();
+    points.map(|x| pose.rotation * x + pose.translation.vector)
+}
+
+pub(crate) fn absolute_minimal<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
+    let points = source.vectors::<T, 3>();
+    let bearings = seen(source, &points);
+    for pose in &s::p3p(&bearings, &points) {
+        sink.finite_pose(pose);
+    }
+    let points = source.vectors::<T, 2>();
+    let bearings = seen(source, &points);
+    for pose in &s::abspose_upright_2pt(&bearings, &points) {
+        sink.finite_pose(pose);
+    }
+}
+
+pub(crate) fn absolute_linear<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
+    let points = source.vectors::<T, 8>();
+    let bearings = seen(source, &points);
+    let n = source.below(9);
+    let (Some(p), Some(b)) = (points.get(..n), bearings.get(..n)) else { return };
+    if let Ok(poses) = s::abspose_npt(b, p) {
+        for pose in &poses {
+            sink.finite_pose(pose);
+        }
+    }
+    let flat = points.map(|x| x.xy());
+    if let Ok(poses) = s::abspose_planar(b, flat.get(..n).unwrap_or(&flat)) {
+        for planar in &poses {
+            sink.finite_pose(&planar.pose);
+            sink.finite(&[planar.rms_rad]);
+        }
+    }
+    let pixels = bearings.map(|b| b.xy() / b.z);
+    if let Ok(Some(projection)) = s::resection_dlt(pixels.get(..n).unwrap_or(&pixels), p) {
+        sink.finite(&projection);
+    }
+    if let Some(parts) = s::decompose_projection(&source.matrix::<T, 3, 4>()) {
+        sink.finite(&parts.calibration);
+        sink.finite_pose(&parts.pose);
+    }
+    if let Ok(Some(pose)) = s::absolute_orientation_npt(b, p) {
+        sink.finite_pose(&pose);
+    }
+    if let Ok(Some(similarity)) = s::absolute_orientation_with_scale_npt(b, p) {
+        sink.finite_pose(&similarity.isometry);
+        sink.finite(&[similarity.scaling()]);
+    }
+}
+
+pub(crate) fn partial_motions<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
+    let (x1, x2) = correspondences::<T, 3>(source);
+    for pose in &s::relpose_upright_3pt(&x1, &x2) {
+        sink.finite_pose(pose);
+    }
+    let rotation = source.rotation::<T>();
+    let (x1, x2) = correspondences::<T, 2>(source);
+    if let Some(rotation) = s::rotation_2pt(&x1, &x2) {
+        sink.finite(&rotation.coords);
+    }
+    if let Some(translation) = s::translation_2pt(&rotation, &x1, &x2) {
+        sink.finite(&translation);
+    }
+    let (x1, x2) = correspondences::<T, 6>(source);
+    let n = source.below(7);
+    let (x1, x2) = (x1.get(..n).unwrap_or(&x1), x2.get(..n).unwrap_or(&x2));
+    if let Ok(Some(rotation)) = s::rotation_npt(x1, x2) {
+        sink.finite(&rotation.coords);
+    }
+    if let Ok(Some(translation)) = s::translation_npt(&rotation, x1, x2) {
+        sink.finite(&translation);
+    }
+}
