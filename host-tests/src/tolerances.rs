@@ -86,6 +86,6 @@ table! {
          EPSILON, its square is left over times the curvature";
     FIVE_POINT_ROOT: 1e-3, 1e-6,
         "distance of unit-norm E; two solutions nearer than this are one, beyond it not the same";
-    FOLDED_GRAM: 1.2e-5, 3e-14,
+    FOLDED_GRAM: 3e-6, 6e-15,
         "elements of R'R relative to the trace of A'A; the rounding of nine reflections a block, 24 rows in blocks of 3";
 }

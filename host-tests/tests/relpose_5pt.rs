@@ -20,6 +20,7 @@ use epipole_host_tests::tolerances::{
 
 const MOTIONS: [Motion; 4] = [Motion::General, Motion::Small, Motion::RandomPose, Motion::Forward];
 
+type Solver = fn(&[Vector3<f32>; 5], &[Vector3<f32>; 5]) -> epipole::Solutions<Essential<f32>, 10>;
 type Pairs<T> = ([Vector3<T>; 5], [Vector3<T>; 5]);
 
 fn pairs<T: Real>(motion: Motion, noise_px: f64, seed: u64) -> Pairs<T> {
@@ -185,14 +186,13 @@ fn exchanging_the_views_transposes() {
 
 #[test]
 fn wide_solves_more_small_motions() {
-    let solved =
-        |solve: fn(&[Vector3<f32>; 5], &[Vector3<f32>; 5]) -> epipole::Solutions<Essential<f32>, 10>| {
-            share_of(2000, |seed, _| {
-                let truth = Scene::new(Motion::Small, 5).generate(seed).pose;
-                let (x1, x2) = pairs::<f32>(Motion::Small, 0.0, seed);
-                best(solve(&x1, &x2).iter().map(|e| essential_error(&e.0, &truth).0)) < SOLVED_ROTATION.f32
-            })
-        };
+    let solved = |solve: Solver| {
+        share_of(2000, |seed, _| {
+            let truth = Scene::new(Motion::Small, 5).generate(seed).pose;
+            let (x1, x2) = pairs::<f32>(Motion::Small, 0.0, seed);
+            best(solve(&x1, &x2).iter().map(|e| essential_error(&e.0, &truth).0)) < SOLVED_ROTATION.f32
+        })
+    };
     let (wide, pure) = (solved(relpose_5pt_wide), solved(relpose_5pt));
     wide.assert_at_least(0.985);
     assert!(wide.failed.len() <= pure.failed.len());

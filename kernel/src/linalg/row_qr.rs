@@ -71,8 +71,9 @@ impl<T: Real, const N: usize> RowQr<T, N> {
                     dot[j] += v * row[j];
                 }
             }
+            // What rounding has left of a dependent block shrinks from column to column, until squares underflow.
             let below = dot[k];
-            if below == T::ZERO {
+            if below <= T::MIN_POSITIVE / T::EPSILON {
                 continue;
             }
             // v = (head - alpha, column k of the block), alpha of the sign that adds.
