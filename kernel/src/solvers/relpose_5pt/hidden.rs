@@ -209,6 +209,6 @@ pub(super) fn unknowns<T: Real>(rows: &[HiddenRow<T>; 3], num: Four<T>, den: Fou
     }
     // x and y come divided by the scale of the homogeneous z.
     let c = [best[0], best[1], best[2] * num, best[2] * den];
-    let s = Four::splat(T::ONE) / (c[0] * c[0] + c[1] * c[1] + (c[2] * c[2] + c[3] * c[3])).sqrt();
+    let s = Four::splat(T::ONE) / (c[0] * c[0] + c[1] * c[1] + (c[2] * c[2] + c[3] * c[3])).root();
     c.map(|v| v * s)
 }

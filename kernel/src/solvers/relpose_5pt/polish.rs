@@ -21,7 +21,7 @@ pub(super) fn norm_sq<T: Real>(v: &V3<T>) -> Four<T> {
 
 #[inline(always)]
 fn unit<T: Real>(v: &V3<T>) -> V3<T> {
-    let s = Four::splat(T::ONE) / norm_sq(v).sqrt();
+    let s = Four::splat(T::ONE) / norm_sq(v).root();
     [v[0] * s, v[1] * s, v[2] * s]
 }
 
@@ -53,7 +53,7 @@ pub(super) fn newton_step<T: Real>(basis: &[[T; 4]; 9], c: &[Four<T>; 4]) -> ([F
         second = select(mask, &columns[b], &second);
         third = select(mask, &columns[d], &third);
     }
-    let s = Four::splat(T::ONE) / largest.sqrt();
+    let s = Four::splat(T::ONE) / largest.root();
     let u1 = first.map(|v| v * s);
     let (p, q) = (cross(&u1, &second), cross(&u1, &third));
     let u3 = unit(&select(norm_sq(&p).greater(norm_sq(&q)), &p, &q));
@@ -86,7 +86,7 @@ pub(super) fn newton_step<T: Real>(basis: &[[T; 4]; 9], c: &[Four<T>; 4]) -> ([F
         m02 * r[1] - m01 * r[2] - m12 * r[0],
     ];
     let along = n[0] * c[0] + n[1] * c[1] + (n[2] * c[2] + n[3] * c[3]);
-    let length = (n[0] * n[0] + n[1] * n[1] + (n[2] * n[2] + n[3] * n[3])).sqrt();
+    let length = (n[0] * n[0] + n[1] * n[1] + (n[2] * n[2] + n[3] * n[3])).root();
     let s = Four::splat(T::ONE) / length;
     let s = Four::select(Four::splat(T::ZERO).greater(along), -s, s);
     let next = n.map(|v| v * s);
