@@ -158,9 +158,12 @@ pub(crate) fn two_view_matrices<T: Real>(source: &mut Source<'_>, sink: &mut Sin
     .flatten()
     {
         sink.finite(&[estimate.noise_px]);
-        if let HomographyVerdict::Found { homography, covariance } = &estimate.verdict {
-            sink.finite(&homography.0);
-            sink.finite(covariance.iter().flatten());
+        if let HomographyVerdict::Found(found) = &estimate.verdict {
+            sink.finite(&found.homography.0);
+            for corner in &found.corners {
+                sink.finite(corner);
+            }
+            sink.finite(found.covariance.iter().flatten());
         }
         sink.flag(estimate.homography().is_some());
     }
