@@ -1,6 +1,5 @@
 //! Epipoles and epipolar lines, and the nearest matrices of rank 2 and of essential form.
 
-use epipole::Real;
 use epipole::geometry::{Essential, Fundamental};
 use epipole::nalgebra::{Matrix3, Vector3};
 use epipole::real::lit;
