@@ -38,9 +38,19 @@ const SAME: f64 = 32.0;
 /// # Degeneracies
 /// No solution where the five equations are linearly dependent (a repeated pair, for example) or a number is not finite.
 ///
+/// # Accuracy
+/// Noise-free problems of a 1241x376 camera with a rotation error below 1e-6 rad in `f64`: 99.98 to 100 % (5000 each of five kinds of motion), real
+/// roots lost against a solution of 31 digits at most 0.015 %, none spurious or twice. Below 1e-3 rad in `f32`: 99.5 % of random poses, 98.9 %
+/// of small motions (99.9 % of both have a solution at all with the rounded bearings), 94 to 95 % of forward motions.
+///
+/// # Cost
+/// No iteration before the roots; then at most 20 Newton steps a root (4 or 5 usual) and 8 a candidate matrix (1 or 2).
+/// Where roots crowd (four of ten `f32` samples) the polynomial is expanded a second time about them.
+///
 /// # References
 /// D. Nistér, "An efficient solution to the five-point relative pose problem", IEEE Transactions on Pattern Analysis
-/// and Machine Intelligence, 2004.
+/// and Machine Intelligence, 2004, for the elimination and the polynomial. Not his: the null space by reflections, orthonormal rows before
+/// the determinant, the roots in Bernstein's basis, the Newton steps on the essential matrices.
 ///
 /// # Examples
 /// ```
@@ -57,6 +67,20 @@ pub fn relpose_5pt<T: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) -> Solut
 }
 
 /// [`relpose_5pt`] with the polynomial of degree 10 and its roots in `f64`, for a core with a double-precision unit.
+///
+/// # Accuracy
+/// Below 1e-3 rad: 99.6 % of random poses, 99.2 % of small motions.
+///
+/// # Examples
+/// ```
+/// use epipole::nalgebra::{Rotation3, Vector3};
+/// let (r, t) = (Rotation3::from_euler_angles(0.1_f32, -0.2, 0.05), Vector3::new(1.0, 0.2, -0.1));
+/// let x1 = [[-1.0, 0.5, 4.0], [1.0, 1.0, 5.0], [0.0, -1.0, 6.0], [-0.5, -0.3, 3.0], [1.0, -0.7, 7.0]].map(Vector3::from);
+/// let x2 = x1.map(|x| r * x + t);
+/// let truth = (t.cross_matrix() * r.matrix()).normalize();
+/// let solutions = epipole::solvers::relpose_5pt_wide(&x1, &x2);
+/// assert!(solutions.iter().any(|e| (e.0 - truth).norm().min((e.0 + truth).norm()) < 1e-4));
+/// ```
 pub fn relpose_5pt_wide(x1: &[Vector3<f32>; 5], x2: &[Vector3<f32>; 5]) -> Solutions<Essential<f32>, 10> {
     solve::<f32, f64>(x1, x2)
 }
