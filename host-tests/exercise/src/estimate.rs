@@ -160,9 +160,7 @@ pub(crate) fn two_view_matrices<T: Real>(source: &mut Source<'_>, sink: &mut Sin
         sink.finite(&[estimate.noise_px]);
         if let HomographyVerdict::Found(found) = &estimate.verdict {
             sink.finite(&found.homography.0);
-            for corner in &found.corners {
-                sink.finite(corner);
-            }
+            sink.finite(found.corners.iter().flatten());
             sink.finite(found.covariance.iter().flatten());
         }
         sink.flag(estimate.homography().is_some());

@@ -6,7 +6,7 @@ use super::load::fill;
 use super::workspace::TwoViewWorkspace;
 use crate::Real;
 use crate::geometry::{Fundamental, Homography};
-use crate::real::{abs, lit, max, sqrt};
+use crate::real::{abs, is_finite, lit, max, sqrt};
 use crate::refine::blocks::PlaneBlock;
 
 /// Correspondences looked at for the centre and the spread.
@@ -87,17 +87,26 @@ impl<T: Real> PixelFrame<T> {
         affine(T::ONE / self.pixels, self.centre2.map(|c| -c / self.pixels))
     }
 
-    /// A homography between pixels, of length 1, of one between coordinates.
-    pub(super) fn homography(&self, h: &Matrix3<T>) -> Homography<T> {
-        let h = affine(self.pixels, self.centre2) * h * self.normaliser1();
-        Homography(h * (T::ONE / sqrt(h.norm_squared())))
+    /// A homography between pixels, of length 1, of one between coordinates; none where it leaves the range of `T`.
+    pub(super) fn homography(&self, h: &Matrix3<T>) -> Option<Homography<T>> {
+        unit(&(affine(self.pixels, self.centre2) * h * self.normaliser1())).map(Homography)
     }
 
-    /// A fundamental matrix of pixels, of length 1, of one of coordinates.
-    pub(super) fn fundamental(&self, f: &Matrix3<T>) -> Fundamental<T> {
-        let f = self.normaliser2().transpose() * f * self.normaliser1();
-        Fundamental(f * (T::ONE / sqrt(f.norm_squared())))
+    /// A fundamental matrix of pixels, of length 1, of one of coordinates; none where it leaves the range of `T`.
+    pub(super) fn fundamental(&self, f: &Matrix3<T>) -> Option<Fundamental<T>> {
+        unit(&(self.normaliser2().transpose() * f * self.normaliser1())).map(Fundamental)
     }
+
+    /// A distance in pixels; 0 where it leaves the range of `T`.
+    pub(super) fn distance_px(&self, distance: T) -> T {
+        let px = distance * self.pixels;
+        if is_finite(px) { px } else { T::ZERO }
+    }
+}
+
+fn unit<T: Real>(m: &Matrix3<T>) -> Option<Matrix3<T>> {
+    let size = sqrt(m.norm_squared());
+    (size > T::ZERO && size <= T::MAX).then(|| m * (T::ONE / size)).filter(|m| is_finite(m.norm_squared()))
 }
 
 /// `x <- scale x + shift`.

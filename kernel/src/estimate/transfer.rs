@@ -24,9 +24,8 @@ pub(super) struct TransferProblem<'a, T, B> {
     pub(super) subset: Option<&'a [u32]>,
 }
 
-/// Passes over the data in the two stages of a local optimisation.
-const WIDE_PASSES: u32 = 4;
-const LOCAL_PASSES: u32 = 6;
+/// Passes over the data in a local optimisation.
+const LOCAL_PASSES: u32 = 5;
 
 impl<T: Real, B: EpipolarBlock<T>> TransferProblem<'_, T, B> {
     fn points(&self, index: u32) -> Option<(Vector3<T>, Vector3<T>)> {
@@ -55,6 +54,8 @@ impl<T: Real, B: EpipolarBlock<T>> TransferProblem<'_, T, B> {
 
 impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 4> for TransferProblem<'_, T, B> {
     type Model = HomographyModel<T>;
+
+    const NEAR_MISSES: u32 = 2;
 
     fn count(&self) -> u32 {
         self.subset.map_or(self.data.count, <[u32]>::len) as u32
@@ -118,10 +119,11 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 4> for TransferProblem<'_, T, B>
     }
 
     fn refine(&self, model: &HomographyModel<T>, residuals: &mut u64) -> Option<HomographyModel<T>> {
-        let wide = Loss::Truncated(self.threshold * T::TWO);
-        let first = self.optimise(model, &wide, WIDE_PASSES, lit(1e-3));
-        let minimum = self.optimise(&first.model, &Loss::Truncated(self.threshold), LOCAL_PASSES, lit(1e-4));
-        *residuals += (first.passes + minimum.passes) as u64 * self.data.count as u64;
+        // A minimal model is off by more than the noise: what lies within twice the threshold takes part, at a weight that
+        // falls with the error. The caller polishes the best.
+        let loss = Loss::Tukey(self.threshold * T::TWO);
+        let minimum = self.optimise(model, &loss, LOCAL_PASSES, lit(1e-2));
+        *residuals += minimum.passes as u64 * self.data.count as u64;
         HomographyModel::new(&minimum.model.0)
     }
 }

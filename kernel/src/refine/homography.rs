@@ -5,7 +5,7 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-use super::blocks::{BlockSlice, EpipolarBlock, PlaneBlock};
+use super::blocks::{Block, BlockSlice, EpipolarBlock, PlaneBlock};
 use super::lm::{Manifold, NormalEquations};
 use super::relative_pose::{Scales, cayley};
 use crate::Real;
@@ -61,7 +61,73 @@ pub(crate) fn transfer_sq<T: Real>(h: &Matrix3<T>, block: &PlaneBlock<T>, weight
     squared
 }
 
-/// One pass over all correspondences for a model of `x2 ~ H x1`.
+/// Index of the pair (i, j) among 00, 01, 11, 02, 12, 22.
+const PAIR: [[usize; 3]; 3] = [[0, 1, 3], [1, 2, 4], [3, 4, 5]];
+
+/// Sums of a pass, lane by lane.
+struct Sums<T> {
+    /// Six scalars (00, 01, 11, 02, 12, 22 of the rows of H) times the six products of the point's coordinates.
+    products: [[Lanes<T>; 6]; 6],
+    slopes: [[Lanes<T>; 3]; 3],
+    cost: Lanes<T>,
+}
+
+impl<T: Real> Sums<T> {
+    /// Adds the lanes of a block of which the first `filled` count.
+    #[inline(always)]
+    fn add(
+        &mut self,
+        h: &Matrix3<T>,
+        plane: &PlaneBlock<T>,
+        weights: &Lanes<T>,
+        loss: &Loss<T>,
+        filled: usize,
+    ) {
+        let zero = [T::ZERO; LANES];
+        let mut row = [zero; 6];
+        let mut slope = [zero; 3];
+        let mut point = [zero; 6];
+        let mut along = [zero; 3];
+        for l in 0..LANES {
+            let (x, y) = (plane[0][l], plane[1][l]);
+            let t = Transfer::new(h, x, y, plane[2][l], plane[3][l]);
+            let mut weight = T::ZERO;
+            if l < filled {
+                let (cost, w) = loss.evaluate(t.squared * weights[l]);
+                self.cost[l] += cost;
+                weight = w * weights[l];
+            }
+            let (w00, w01, w11) = (weight * t.w[0], weight * t.w[1], weight * t.w[2]);
+            let (w02, w12) = (-(w00 * t.u + w01 * t.v), -(w01 * t.u + w11 * t.v));
+            let w22 = -(w02 * t.u + w12 * t.v);
+            (row[0][l], row[1][l], row[2][l]) = (w00, w01, w11);
+            (row[3][l], row[4][l], row[5][l]) = (w02, w12, w22);
+            let (a, b, c) = (x * t.inverse_z, y * t.inverse_z, t.inverse_z);
+            (point[0][l], point[1][l], point[2][l]) = (a * a, a * b, b * b);
+            (point[3][l], point[4][l], point[5][l]) = (a * c, b * c, c * c);
+            (along[0][l], along[1][l], along[2][l]) = (a, b, c);
+            let (p, q) = (w00 * t.ex + w01 * t.ey, w01 * t.ex + w11 * t.ey);
+            (slope[0][l], slope[1][l], slope[2][l]) = (p, q, -(t.u * p + t.v * q));
+        }
+        for i in 0..6 {
+            for j in 0..6 {
+                for l in 0..LANES {
+                    self.products[i][j][l] += row[i][l] * point[j][l];
+                }
+            }
+        }
+        for i in 0..3 {
+            for j in 0..3 {
+                for l in 0..LANES {
+                    self.slopes[i][j][l] += slope[i][l] * along[j][l];
+                }
+            }
+        }
+    }
+}
+
+/// One pass over all correspondences for a model of `x2 ~ H x1`. Those beyond the loss's support are left out; the others
+/// are packed into full blocks first, so that the derivatives are computed for them alone.
 pub(crate) fn transfer_equations<T, B, M, const P: usize>(
     data: BlockSlice<'_, B>,
     model: &M,
@@ -74,51 +140,41 @@ where
 {
     let h = model.matrix();
     let zero = [T::ZERO; LANES];
-    // Six scalars (00, 01, 11, 02, 12, 22 of the rows of H) times the six products of the point's coordinates.
-    let mut products = [[zero; 6]; 6];
-    let mut slopes = [[zero; 3]; 3];
-    let mut cost = zero;
-    let mut active = 0u32;
+    let mut sums = Sums { products: [[zero; 6]; 6], slopes: [[zero; 3]; 3], cost: zero };
     let support = loss.support().unwrap_or(T::MAX);
     let beyond = if support < T::MAX { loss.evaluate(support).0 } else { T::ZERO };
+    let mut active = 0u32;
+    let (mut pending, mut pending_weights) = (PlaneBlock::zero(), zero);
+    let mut filled = 0usize;
     let mut left = data.count;
     for block in data.blocks {
         let (plane, weights) = block.planes();
+        let squared = transfer_sq(&h, &plane, &weights);
         for l in 0..LANES {
-            let (x, y) = (plane[0][l], plane[1][l]);
-            let t = Transfer::new(&h, x, y, plane[2][l], plane[3][l]);
-            let squared = t.squared * weights[l];
-            // Written so that a NaN is left out.
-            if l >= left || !(squared < support && t.inverse_z > T::ZERO) {
-                continue;
-            }
-            let (loss, weight) = loss.evaluate(squared);
-            cost[l] += loss;
-            active += 1;
-            let weight = weight * weights[l];
-            let (w00, w01, w11) = (weight * t.w[0], weight * t.w[1], weight * t.w[2]);
-            let (w02, w12) = (-(w00 * t.u + w01 * t.v), -(w01 * t.u + w11 * t.v));
-            let w22 = -(w02 * t.u + w12 * t.v);
-            let (a, b, c) = (x * t.inverse_z, y * t.inverse_z, t.inverse_z);
-            let point = [a * a, a * b, b * b, a * c, b * c, c * c];
-            for (sums, w) in products.iter_mut().zip([w00, w01, w11, w02, w12, w22]) {
-                for (sum, p) in sums.iter_mut().zip(point) {
-                    sum[l] += w * p;
+            if l < left && squared[l] < support {
+                pending.set_lane(filled, &plane, l);
+                if let Some(weight) = pending_weights.get_mut(filled) {
+                    *weight = weights[l];
                 }
-            }
-            let (p, q) = (w00 * t.ex + w01 * t.ey, w01 * t.ex + w11 * t.ey);
-            let r = -(t.u * p + t.v * q);
-            for (sums, s) in slopes.iter_mut().zip([p, q, r]) {
-                sums[0][l] += s * a;
-                sums[1][l] += s * b;
-                sums[2][l] += s * c;
+                filled += 1;
+                active += 1;
+                if filled == LANES {
+                    sums.add(&h, &pending, &pending_weights, loss, LANES);
+                    filled = 0;
+                }
             }
         }
         left = left.saturating_sub(LANES);
     }
+    if filled > 0 {
+        sums.add(&h, &pending, &pending_weights, loss, filled);
+    }
     let total = |lanes: &Lanes<T>| (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
-    // Index of the pair (i, j) among 00, 01, 11, 02, 12, 22.
-    const PAIR: [[usize; 3]; 3] = [[0, 1, 3], [1, 2, 4], [3, 4, 5]];
+    let mut products = [[T::ZERO; 6]; 6];
+    for (totals, lanes) in products.iter_mut().zip(&sums.products) {
+        *totals = [0, 1, 2, 3, 4, 5].map(|k: usize| total(&lanes[k]));
+    }
+    let slopes = sums.slopes.map(|row| row.map(|lanes| total(&lanes)));
     let tangents = model.tangents();
     let mut hessian = SMatrix::<T, P, P>::zeros();
     let mut gradient = SVector::<T, P>::zeros();
@@ -129,29 +185,30 @@ where
                 let mut sum = T::ZERO;
                 for k in 0..3 {
                     for m in 0..3 {
-                        sum += total(&products[PAIR[i][k]][PAIR[j][m]]) * tangents[q][3 * k + m];
+                        sum += products[PAIR[i][k]][PAIR[j][m]] * tangents[q][3 * k + m];
                     }
                 }
                 image[3 * i + j] = sum;
             }
         }
-        for p in 0..P {
+        for p in 0..=q {
             let mut sum = T::ZERO;
             for k in 0..9 {
                 sum += tangents[p][k] * image[k];
             }
             hessian.data.0[q][p] = sum;
+            hessian.data.0[p][q] = sum;
         }
         let mut sum = T::ZERO;
         for i in 0..3 {
             for j in 0..3 {
-                sum += total(&slopes[i][j]) * tangents[q][3 * i + j];
+                sum += slopes[i][j] * tangents[q][3 * i + j];
             }
         }
         gradient.data.0[0][q] = sum;
     }
     let outside = (data.count as u32).saturating_sub(active);
-    let cost = total(&cost) + crate::real::from_u32::<T>(outside) * beyond;
+    let cost = total(&sums.cost) + crate::real::from_u32::<T>(outside) * beyond;
     NormalEquations { hessian, gradient, cost, active }
 }
 

@@ -11,6 +11,10 @@ pub trait Estimator<T: Real, const S: usize> {
     /// What is estimated.
     type Model: Copy;
 
+    /// How many hypotheses that come near the best one are optimised locally at once, beside those that are better. Fewer
+    /// serve where a minimal sample already fixes the model well.
+    const NEAR_MISSES: u32 = 10;
+
     /// How many correspondences there are.
     fn count(&self) -> u32;
 

@@ -14,8 +14,8 @@ pub const KEPT: usize = 4;
 /// A sample's best hypothesis is optimised where it explains this share of what the best minimal model does: the
 /// best minimal model need not lie in the best basin.
 const SLACK: f64 = 0.7;
-/// As many near misses may be optimised at once; then one in 32 iterations.
-const NEAR_MISSES: u32 = 10;
+/// Beyond [`Estimator::NEAR_MISSES`], near misses are optimised once in as many iterations.
+const NEAR_MISS_INTERVAL: u32 = 32;
 
 /// What a run found: models after local optimisation, best first, and how it went.
 #[derive(Clone, Copy, Debug)]
@@ -93,7 +93,8 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
         }
 
         // Near misses are optimised too, at a bounded rate.
-        let near = minimal_cost < T::MAX && spent.refinements < NEAR_MISSES + spent.iterations / 32;
+        let near = minimal_cost < T::MAX
+            && spent.refinements < E::NEAR_MISSES + spent.iterations / NEAR_MISS_INTERVAL;
         let bound = if near { all - (all - minimal_cost) * lit(SLACK) } else { minimal_cost };
         let mut leader: Option<(E::Model, Score<T>)> = None;
         let mut hypotheses = 0;

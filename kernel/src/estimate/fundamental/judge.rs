@@ -76,7 +76,7 @@ impl<T: Real> Judge<'_, '_, T> {
         let count = data.count as u32;
         let accident = self.accident();
         let mut model = self.refine(best);
-        let mut inliers = self.mark(&model, mask);
+        let inliers = self.mark(&model, mask);
         if !beyond_chance(count, inliers, 7, accident) {
             return (self.without_model(mask, order), T::ZERO);
         }
@@ -100,17 +100,22 @@ impl<T: Real> Judge<'_, '_, T> {
                     let other = self.refine(&other);
                     if self.problem.cost(&other) < self.problem.cost(&model) {
                         model = other;
-                        inliers = self.mark(&model, mask);
+                        self.mark(&model, mask);
                     }
                 }
                 let split = self.split(&plane, sigma, mask, order);
-                if !beyond_chance(split.outside, split.off, 2, accident) && inliers > 0 {
+                if !beyond_chance(split.outside, split.off, 2, accident)
+                    && let Some(homography) = self.frame.homography(&plane.0)
+                {
                     self.mark_plane(&plane, sigma, mask);
-                    return (FundamentalVerdict::Planar(self.frame.homography(&plane.0)), noise);
+                    return (FundamentalVerdict::Planar(homography), noise);
                 }
             }
         }
-        (FundamentalVerdict::Found(self.frame.fundamental(&model.matrix)), self.noise(&model))
+        match self.frame.fundamental(&model.matrix) {
+            Some(fundamental) => (FundamentalVerdict::Found(fundamental), self.noise(&model)),
+            None => (self.without_model(mask, order), T::ZERO),
+        }
     }
 
     /// The model that all inliers support, with what lies just beyond the threshold at a falling weight.

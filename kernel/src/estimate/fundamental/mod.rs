@@ -149,7 +149,7 @@ pub fn fundamental_guided<T: Real>(
         None => (judge.without_model(mask, workspace.order), T::ZERO),
     };
     report.inliers = mask.iter().map(|&inlier| inlier as u32).sum();
-    Ok(FundamentalEstimate { verdict, noise_px: noise * frame.pixels, report })
+    Ok(FundamentalEstimate { verdict, noise_px: frame.distance_px(noise), report })
 }
 
 /// The smallest consensus of interest to the search; the verdict asks for more where chance demands it.

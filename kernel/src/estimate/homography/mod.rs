@@ -154,7 +154,7 @@ pub fn homography_guided<T: Real>(
         None => (judge.without_model(mask, workspace.order), T::ZERO),
     };
     report.inliers = mask.iter().map(|&inlier| inlier as u32).sum();
-    Ok(HomographyEstimate { verdict, noise_px: noise * frame.pixels, report })
+    Ok(HomographyEstimate { verdict, noise_px: frame.distance_px(noise), report })
 }
 
 /// The smallest consensus of interest to the search; the verdict asks for more where chance demands it.
@@ -207,7 +207,7 @@ impl<T: Real> Judge<'_, '_, T> {
         let data = problem.data;
         // What lies just beyond the threshold takes part at a falling weight.
         let support = problem.threshold * T::TWO;
-        let minimum = problem.optimise(best, &Loss::Tukey(support), FINAL_PASSES, lit(1e-6));
+        let minimum = problem.optimise(best, &Loss::Tukey(support), FINAL_PASSES, lit(1e-4));
         let Some(model) = HomographyModel::new(&minimum.model.0) else {
             return (self.without_model(mask, order), T::ZERO);
         };
@@ -226,9 +226,12 @@ impl<T: Real> Judge<'_, '_, T> {
         if on_a_line(data, indices, sigma, accident) {
             return (HomographyVerdict::Unobservable(Unobservable::Collinear), noise);
         }
+        let Some(homography) = self.frame.homography(&model.0) else {
+            return (self.without_model(mask, order), T::ZERO);
+        };
         let corners = corners(data, &model, mask);
         let found = FoundHomography {
-            homography: self.frame.homography(&model.0),
+            homography,
             corners: corners.map(|corner| to_pixels(self.frame, corner)),
             covariance: covariance(&model, &minimum.equations, &scatter, &corners, self.frame),
         };
