@@ -27,7 +27,7 @@ struct Arguments {
     /// Two images (JPEG or PNG); a built-in scene without them.
     #[arg(num_args = 2, value_names = ["IMAGE1", "IMAGE2"], requires = "camera")]
     images: Vec<PathBuf>,
-    /// Camera of both images, in pixels: fx,fy,cx,cy[,k1,k2,p1,p2[,k3]]; the centre of the top-left pixel is (0, 0).
+    /// Camera of both images, in pixels: `fx,fy,cx,cy[,k1,k2,p1,p2[,k3]]`; the centre of the top-left pixel is (0, 0).
     #[arg(long, value_name = "NUMBERS", allow_hyphen_values = true)]
     camera: Option<CameraParameters>,
     /// Camera of image 2, where it differs.
