@@ -199,3 +199,42 @@ fn wrong_command_lines() {
     let output = evaluate(&folder, &["relative-pose", "a.txt", "--confidence", "1.5"]);
     assert_eq!(pooled(&text(&output.stdout), "fail"), 1.0);
 }
+
+#[test]
+fn absolute_pose_of_known_points() {
+    let folder = folder("absolute");
+    let mut state = 9;
+    let rotation = Rotation3::from_scaled_axis(Vector3::new(0.03, -0.12, 0.05));
+    let t = Vector3::new(0.8, -0.1, 0.2);
+    let r: Vec<String> = rotation.matrix().transpose().iter().map(f64::to_string).collect();
+    let mut out = format!(
+        "# size 640 480\nK {} {} {} {}\nR_gt {}\nt_gt {} {} {}\nn 80\n",
+        CAMERA[0],
+        CAMERA[1],
+        CAMERA[2],
+        CAMERA[3],
+        r.join(" "),
+        t.x,
+        t.y,
+        t.z
+    );
+    for k in 0..80 {
+        let x =
+            Vector3::new(2.0 * random(&mut state), 1.5 * random(&mut state), 6.0 + 2.0 * random(&mut state));
+        let [u, v] = pixel(&(rotation * x + t));
+        let wrong = if k % 4 == 3 { 80.0 } else { 0.3 };
+        let (du, dv) = (wrong * random(&mut state), wrong * random(&mut state));
+        writeln!(out, "{} {} {} {} {} {k}", x.x, x.y, x.z, u + du, v + dv).unwrap();
+    }
+    fs::write(folder.join("a.txt"), &out).unwrap();
+    for scalar in ["f32", "f64"] {
+        let run = evaluate(&folder, &["absolute-pose", "a.txt", "--scalar", scalar]);
+        assert_eq!(run.status.code(), Some(0), "{}", text(&run.stderr));
+        let line = text(&run.stdout);
+        assert!(line.contains("pooled files=1") && line.contains("fail=0.0000"), "{line}");
+    }
+    fs::write(folder.join("broken.txt"), out.replace("n 80", "n 81")).unwrap();
+    let run = evaluate(&folder, &["absolute-pose", "."]);
+    assert_eq!(run.status.code(), Some(3));
+    assert!(text(&run.stderr).contains("80 correspondences, 81 announced"), "{}", text(&run.stderr));
+}

@@ -26,6 +26,7 @@ pub(crate) enum Problem {
     RelativePose,
     Homography,
     Fundamental,
+    AbsolutePose,
 }
 
 /// The ground truth of a file.
@@ -186,7 +187,7 @@ impl Header {
 }
 
 /// Finite numbers with spaces between them.
-fn numbers(text: &str) -> Result<Vec<f64>, String> {
+pub(crate) fn numbers(text: &str) -> Result<Vec<f64>, String> {
     text.split_whitespace()
         .map(|word| match word.parse::<f64>() {
             Ok(number) if number.is_finite() => Ok(number),
@@ -195,7 +196,7 @@ fn numbers(text: &str) -> Result<Vec<f64>, String> {
         .collect()
 }
 
-fn array<const N: usize>(text: &str) -> Result<[f64; N], String> {
+pub(crate) fn array<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let numbers = numbers(text)?;
     numbers.try_into().map_err(|found: Vec<f64>| format!("{} numbers, {N} needed", found.len()))
 }

@@ -3,6 +3,7 @@
 //! `cargo run --release --bin evaluate -- relative-pose PATH...`, where a path is a file, or a folder that is searched
 //! for `.txt` files. The format of the files is described in `file.rs` and by `--help`.
 
+mod absolute;
 mod file;
 mod plot;
 mod report;
@@ -30,10 +31,12 @@ Format of a file, one item a line; lines that start with `#` are skipped, but `#
   n N                   then N lines:
   x1 y1 x2 y2 score     pixels, the centre of the top-left pixel being (0, 0); a lower score is better, and it may be
                         left out
+For absolute-pose: K fx fy cx cy, R_gt and t_gt (x ~ K (R_gt X + t_gt)), n N, then lines X Y Z u v score.
 The correspondences are shuffled before they are used.
 
 Errors: relative-pose and fundamental (by its essential matrix), rotation and direction of translation in degrees, by
-the chord; homography, the mean distance in pixels over the part of image 1 that the truth sends into image 2. A file
+the chord; homography, the mean distance in pixels over the part of image 1 that the truth sends into image 2;
+absolute-pose, the position in percent of the distance from the middle of the points. A file
 fails above 5 degrees or 10 pixels; a refusal is a failure.
 
 Exit code: 0; 1 if nothing could be evaluated; 2 for a wrong command line; 3 if some file was broken and skipped.";
@@ -120,14 +123,18 @@ fn evaluate(arguments: &Arguments) -> Result<ExitCode, String> {
     let mut broken = 0usize;
     for path in &paths {
         progress.set_message(report::scene(path));
-        match file::read(path, problem) {
-            Ok(file) => {
-                let outcome = match arguments.scalar {
-                    Scalar::F32 => run::run::<f32>(problem, &file, &settings),
-                    Scalar::F64 => run::run::<f64>(problem, &file, &settings),
-                };
-                outcomes.push((path.clone(), outcome));
-            }
+        let outcome = match problem {
+            Problem::AbsolutePose => absolute::read(path).map(|file| match arguments.scalar {
+                Scalar::F32 => absolute::run::<f32>(&file, &settings),
+                Scalar::F64 => absolute::run::<f64>(&file, &settings),
+            }),
+            _ => file::read(path, problem).map(|file| match arguments.scalar {
+                Scalar::F32 => run::run::<f32>(problem, &file, &settings),
+                Scalar::F64 => run::run::<f64>(problem, &file, &settings),
+            }),
+        };
+        match outcome {
+            Ok(outcome) => outcomes.push((path.clone(), outcome)),
             Err(why) => {
                 broken += 1;
                 progress.suspend(|| eprintln!("skipped {why}"));

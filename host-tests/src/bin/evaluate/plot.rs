@@ -34,6 +34,7 @@ pub(crate) fn write_svg(
         .build_cartesian_2d(0.0..limit, 0.0..100.0)?;
     let axis = match problem {
         Problem::Homography => format!("mean transfer error ({})", scale.unit),
+        Problem::AbsolutePose => format!("larger error of rotation and position ({})", scale.unit),
         _ => format!("larger error of rotation and direction of translation ({})", scale.unit),
     };
     chart

@@ -25,6 +25,12 @@ pub(crate) fn scale(problem: Problem) -> Scale {
         Problem::Homography => {
             Scale { unit: "px", thresholds: [3.0, 5.0, 10.0], fail: 10.0, medians: &["median_px"] }
         }
+        Problem::AbsolutePose => Scale {
+            unit: "deg or percent",
+            thresholds: [0.5, 1.0, 5.0],
+            fail: 5.0,
+            medians: &["median_r_deg", "median_position_percent"],
+        },
         Problem::RelativePose | Problem::Fundamental => Scale {
             unit: "deg",
             thresholds: [5.0, 10.0, 20.0],
@@ -101,7 +107,11 @@ pub(crate) fn print(problem: Problem, outcomes: &[(PathBuf, Outcome)]) {
 
 /// One line a file.
 pub(crate) fn write_csv(path: &Path, problem: Problem, outcomes: &[(PathBuf, Outcome)]) -> io::Result<()> {
-    let errors = if problem == Problem::Homography { "error_px" } else { "r_deg,t_deg" };
+    let errors = match problem {
+        Problem::Homography => "error_px",
+        Problem::AbsolutePose => "r_deg,position_percent",
+        _ => "r_deg,t_deg",
+    };
     let mut out = format!("file,{errors},correspondences,inliers,iterations,ms,refusal\n");
     for (file, o) in outcomes {
         let errors: Vec<String> =

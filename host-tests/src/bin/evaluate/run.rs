@@ -51,7 +51,7 @@ fn select(all: &[Correspondence], limit: Option<usize>, seed: u64) -> Vec<Corres
 }
 
 /// SplitMix64 (Steele, Lea, Flood, OOPSLA 2014).
-fn next_random(state: &mut u64) -> u64 {
+pub(crate) fn next_random(state: &mut u64) -> u64 {
     *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let mut z = *state;
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -64,7 +64,7 @@ fn default_threshold(file: &CorrespondenceFile) -> f64 {
     if file.size.is_some_and(|[width, _]| width > 2000.0) { 2.0 } else { 1.0 }
 }
 
-fn pinhole<T: Real>([fx, fy, cx, cy]: [f64; 4]) -> Pinhole<T> {
+pub(crate) fn pinhole<T: Real>([fx, fy, cx, cy]: [f64; 4]) -> Pinhole<T> {
     Pinhole::new(lit(fx), lit(fy), lit(cx), lit(cy)).expect("the reader checked the intrinsics")
 }
 
@@ -111,7 +111,7 @@ fn judge<T: Real, A, E: Display>(
 }
 
 /// The name of a verdict, without what it carries.
-fn name(verdict: &impl Debug) -> String {
+pub(crate) fn name(verdict: &impl Debug) -> String {
     let text = format!("{verdict:?}");
     text.split(['(', '{', ' ']).next().unwrap_or_default().into()
 }
@@ -196,7 +196,7 @@ fn homography<T: Real>(
 }
 
 impl Settings {
-    fn apply<T: Real>(&self, options: &mut RansacOptions<T>) {
+    pub(crate) fn apply<T: Real>(&self, options: &mut RansacOptions<T>) {
         options.seed = self.seed;
         if let Some(confidence) = self.confidence {
             options.confidence = lit(confidence);
