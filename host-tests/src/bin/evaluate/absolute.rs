@@ -154,8 +154,8 @@ pub(crate) fn run<T: Real>(file: &AbsoluteFile, settings: &Settings) -> Outcome 
     Outcome {
         errors,
         correspondences: rows.len(),
-        inliers: estimate.report.inliers as usize,
-        iterations: estimate.report.spent.iterations.into(),
+        inliers: estimate.report.inliers,
+        iterations: estimate.report.spent.iterations,
         milliseconds,
         refusal,
     }
