@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix3, Matrix3x2, Quaternion, Translation3, UnitQuat
 
 use crate::Real;
 use crate::linalg::{Svd3, svd3};
-use crate::real::{abs, atan2, lit, max, sin_cos, sqrt};
+use crate::real::{abs, atan2, is_finite, lit, max, sin_cos, sqrt};
 
 /// A pose maps into the camera: `x_cam = R X + t`. Of two views, the pose of view 2 in the frame of view 1:
 /// `X2 = R X1 + t`, |t| = 1 where scale is unobservable.
@@ -46,6 +46,12 @@ pub fn quaternion_from_matrix<T: Real>(r: &Matrix3<T>) -> UnitQuaternion<T> {
     }
     let scale = one / sqrt(w * w + x * x + y * y + z * z);
     UnitQuaternion::new_unchecked(Quaternion::new(w * scale, x * scale, y * scale, z * scale))
+}
+
+/// The pose, if all its numbers are finite.
+pub(crate) fn finite<T: Real>(pose: Pose<T>) -> Option<Pose<T>> {
+    let mut numbers = pose.rotation.coords.iter().chain(pose.translation.vector.iter());
+    numbers.all(|&x| is_finite(x)).then_some(pose)
 }
 
 /// The cross-product matrix `[v]x`, with `[v]x u = v x u`.

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Similarity3, Translation3, UnitQuaternion, Vector3};
 
 use crate::geometry::Pose;
-use crate::geometry::pose::quaternion_from_matrix;
+use crate::geometry::pose::{finite, quaternion_from_matrix};
 use crate::input::check;
 use crate::linalg::svd3;
 use crate::real::{from_u32, lit};
@@ -50,9 +50,9 @@ pub fn absolute_orientation_npt<T: Real>(
     b: &[Vector3<T>],
 ) -> Result<Option<Pose<T>>, InputError> {
     check(a, b, 3)?;
-    Ok(align(a, b).map(|fit| {
+    Ok(align(a, b).and_then(|fit| {
         let t = fit.mean_b - fit.rotation * fit.mean_a;
-        Pose::from_parts(Translation3::from(t), fit.rotation)
+        finite(Pose::from_parts(Translation3::from(t), fit.rotation))
     }))
 }
 
@@ -95,9 +95,10 @@ pub fn absolute_orientation_with_scale_npt<T: Real>(
     b: &[Vector3<T>],
 ) -> Result<Option<Similarity3<T>>, InputError> {
     check(a, b, 3)?;
-    Ok(align(a, b).filter(|fit| fit.scale > T::ZERO && fit.scale <= T::MAX).map(|fit| {
+    Ok(align(a, b).filter(|fit| fit.scale > T::ZERO && fit.scale <= T::MAX).and_then(|fit| {
         let t = fit.mean_b - fit.rotation * fit.mean_a * fit.scale;
-        Similarity3::from_parts(Translation3::from(t), fit.rotation, fit.scale)
+        let pose = finite(Pose::from_parts(Translation3::from(t), fit.rotation))?;
+        Some(Similarity3::from_isometry(pose, fit.scale))
     }))
 }
 

@@ -145,7 +145,9 @@ pub fn p3p<T: Real>(bearings: &[Vector3<T>; 3], points: &[Vector3<T>; 3]) -> Sol
         let e3 = e1.cross(&e2);
         let rotation = e1 * g1.transpose() + e2 * g2.transpose() + e3 * g3.transpose();
         let translation = y0 - rotation * p0;
-        solutions.push(pose::from_parts(&rotation, &translation));
+        if let Some(pose) = pose::finite(pose::from_parts(&rotation, &translation)) {
+            solutions.push(pose);
+        }
     }
     solutions
 }

@@ -3,10 +3,10 @@
 use nalgebra::{Matrix3, Matrix3x4, Vector2, Vector3};
 
 use crate::geometry::Pose;
-use crate::geometry::pose::from_parts;
+use crate::geometry::pose::{finite, from_parts};
 use crate::input::check_finite;
 use crate::linalg::RowQr;
-use crate::real::{from_u32, lit, sqrt};
+use crate::real::{from_u32, is_finite, lit, sqrt};
 use crate::{InputError, Real};
 
 /// What a projection matrix is made of: `P ~ K [R | t]`.
@@ -183,5 +183,6 @@ pub fn decompose_projection<T: Real>(p: &Matrix3x4<T>) -> Option<ProjectionParts
     let t2 = (p[(1, 3)] - k23 * t3) / k22;
     let t1 = (p[(0, 3)] - k12 * t2 - k13 * t3) / k11;
     let rotation = Matrix3::from_rows(&[r1.transpose(), r2.transpose(), r3.transpose()]);
-    Some(ProjectionParts { calibration, pose: from_parts(&rotation, &Vector3::new(t1, t2, t3)) })
+    let pose = finite(from_parts(&rotation, &Vector3::new(t1, t2, t3)))?;
+    calibration.iter().all(|&x| is_finite(x)).then_some(ProjectionParts { calibration, pose })
 }

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use crate::geometry::pose::quaternion_from_matrix;
 use crate::input::check;
 use crate::linalg::svd3;
-use crate::real::{lit, sqrt};
+use crate::real::{is_finite, lit, sqrt};
 use crate::{InputError, Real};
 
 /// The rotation that maps two bearings onto two others: `x2 ~ R x1`.
@@ -44,7 +44,8 @@ use crate::{InputError, Real};
 #[must_use]
 pub fn rotation_2pt<T: Real>(x1: &[Vector3<T>; 2], x2: &[Vector3<T>; 2]) -> Option<UnitQuaternion<T>> {
     let (a, b) = (frame(x1)?, frame(x2)?);
-    Some(quaternion_from_matrix(&(b * a.transpose())))
+    let rotation = quaternion_from_matrix(&(b * a.transpose()));
+    rotation.coords.iter().all(|&x| is_finite(x)).then_some(rotation)
 }
 
 /// Bisector, normal and their cross product as columns.
