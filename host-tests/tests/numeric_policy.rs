@@ -105,10 +105,10 @@ const FORBIDDEN_METHODS: &[&str] = &[
     "expect_err",
 ];
 
-/// Integers and `core::cmp` have exact functions of these names.
+/// Integers and `core::cmp` have exact functions of these names, `linalg` and `geometry::pose` bounded ones.
 const EXACT_OWNERS: &[&str] = &[
-    "real", "libm", "cmp", "u8", "u16", "u32", "u64", "u128", "usize", "i8", "i16", "i32", "i64", "i128",
-    "isize", "Ord",
+    "linalg", "pose", "real", "libm", "cmp", "u8", "u16", "u32", "u64", "u128", "usize", "i8", "i16", "i32",
+    "i64", "i128", "isize", "Ord",
 ];
 
 const FORBIDDEN_MACROS: &[&str] =

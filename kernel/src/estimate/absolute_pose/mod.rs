@@ -304,7 +304,7 @@ impl<T: Real> Gravity<T> {
         Some(Self { direction, sigma_rad: prior.sigma_rad })
     }
 
-    fn angle(&self, pose: &CameraPose<T>) -> T {
+    fn deviation(&self, pose: &CameraPose<T>) -> T {
         vector_angle(&(pose.rotation * self.direction.world), &self.direction.camera)
     }
 }
@@ -420,7 +420,7 @@ fn search<T: Real, B: ReprojectionBlock<T>>(
         return (ransac::<T, _, 3>(problem, options, order, NEEDED as u32, keep_going), None);
     };
     let angle_of = |consensus: &Consensus<CameraPose<T>, T>| {
-        consensus.models[0].map_or(T::MAX, |(model, _)| gravity.angle(&model))
+        consensus.models[0].map_or(T::MAX, |(model, _)| gravity.deviation(&model))
     };
     let limit = gravity.sigma_rad * lit(PRIOR_SIGMAS);
     let upright_frame = |v: &Vector3<T>| upright(v).unwrap_or_else(nalgebra::Matrix3::identity);
