@@ -14,3 +14,4 @@ pub mod render;
 pub mod texture;
 pub mod track;
 pub mod two_view;
+pub mod window;
