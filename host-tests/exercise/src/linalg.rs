@@ -87,6 +87,9 @@ pub(crate) fn polynomials<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
     let roots = linalg::cubic_roots(&source.array::<T, 4>());
     sink.count(roots.len());
     sink.finite(roots.iter());
+    let roots = linalg::quartic_roots(&source.array::<T, 5>());
+    sink.count(roots.len());
+    sink.finite(roots.iter());
     let roots = linalg::quadratic_roots(&source.array::<T, 3>());
     sink.count(roots.len());
     sink.finite(roots.iter());

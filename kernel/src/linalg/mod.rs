@@ -15,6 +15,7 @@ mod least_singular3;
 mod lu;
 mod null_space;
 pub mod poly;
+mod quartic;
 mod row_qr;
 mod svd3;
 
@@ -25,6 +26,7 @@ pub use ldlt::Ldlt;
 pub(crate) use least_singular3::least_singular3;
 pub use lu::Lu;
 pub use null_space::{null_space, null_space_refined};
+pub use quartic::quartic_roots;
 pub use row_qr::{LeastSingular, RowQr};
 pub use svd3::{Svd3, svd3};
 
