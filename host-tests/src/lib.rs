@@ -14,6 +14,7 @@ pub mod rng;
 pub mod scenes;
 pub mod source;
 pub mod tolerances;
+pub mod two_view;
 
 pub use cases::{Share, for_each_case, share_of};
 pub use rng::Rng;

@@ -38,7 +38,7 @@ pub use homography::{
 };
 pub use relative_pose::{
     GeneralMotion, PlanarPose, PureRotation, RelativePoseError, RelativePoseEstimate, RelativePoseOptions,
-    RelativePoseVerdict, Unobservable, relative_pose, relative_pose_guided,
+    RelativePoseVerdict, Unobservable, refine_relative_pose, relative_pose, relative_pose_guided,
 };
 pub use workspace::{
     RelativePoseStorage, RelativePoseWorkspace, TwoViewStorage, TwoViewWorkspace, WideTwoViewStorage,

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 use crate::Real;
 use crate::geometry::pose::{skew, tangent_basis};
 use crate::linalg::Ldlt;
-use crate::real::{from_u32, max};
+use crate::real::{from_u32, lit, max, sqrt};
 use crate::refine::homography::HomographyModel;
 use crate::refine::lm::{Manifold, NormalEquations};
 use crate::refine::relative_pose::Scales;
@@ -16,6 +16,71 @@ pub(super) fn covariance<T: Real, const P: usize>(
     variance: T,
 ) -> Option<SMatrix<T, P, P>> {
     Ldlt::new(&sums.hessian).map(|factors| factors.inverse() * variance)
+}
+
+/// Sums over residuals within the support of Tukey's loss: of `r psi`, of `psi^2` and of `psi'`, in units of the support.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PsiSums<T> {
+    r_psi: T,
+    psi_sq: T,
+    slope: T,
+    slope_sq: T,
+    count: u32,
+}
+
+impl<T: Real> Default for PsiSums<T> {
+    fn default() -> Self {
+        Self { r_psi: T::ZERO, psi_sq: T::ZERO, slope: T::ZERO, slope_sq: T::ZERO, count: 0 }
+    }
+}
+
+/// What the residuals say about the noise and about a refined model.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spread<T> {
+    /// Standard deviation of a residual.
+    pub(super) noise: T,
+    /// The factor of `(J' J)^-1` in the covariance.
+    pub(super) variance: T,
+}
+
+impl<T: Real> PsiSums<T> {
+    /// Adds a residual whose square over the support's is `u`; nothing beyond the support.
+    pub(super) fn add(&mut self, u: T) {
+        if u < T::ONE {
+            let w = T::ONE - u;
+            let psi_over_r = w * w;
+            self.r_psi += u * psi_over_r;
+            self.psi_sq += u * psi_over_r * psi_over_r;
+            let slope = w * (T::ONE - u * lit(5.0));
+            self.slope += slope;
+            self.slope_sq += slope * slope;
+            self.count += 1;
+        }
+    }
+
+    /// The noise by Stein's identity `E[r psi] = sigma^2 E[psi']`, which holds for Gaussian residuals whatever the loss
+    /// cuts off, and the M-estimator's variance `E[psi^2] / E[psi']^2`; `freedom` parameters were fitted.
+    ///
+    /// # References
+    /// P. Huber, "Robust Statistics", 1981, section 7.6; C. Stein, "Estimation of the mean of a multivariate normal
+    /// distribution", Annals of Statistics, 1981.
+    pub(super) fn spread(&self, support: T, freedom: u32) -> Spread<T> {
+        let n = from_u32::<T>(self.count);
+        let fitted = n / from_u32(core::cmp::max(self.count.saturating_sub(freedom), 1));
+        // Residuals spread over the whole support leave no slope: then nothing better than the support is known.
+        let slope = max(self.slope, n * lit(0.05));
+        if self.count == 0 {
+            return Spread { noise: T::ZERO, variance: T::ZERO };
+        }
+        let scale = support * support * fitted;
+        // Huber's correction for few residuals: 1 + p / n var(psi') / E[psi']^2.
+        let spread = max(self.slope_sq * n / (slope * slope) - T::ONE, T::ZERO);
+        let correction = T::ONE + from_u32::<T>(freedom) / n * spread;
+        Spread {
+            noise: sqrt(self.r_psi / slope * scale),
+            variance: self.psi_sq * n / (slope * slope) * scale * correction * correction,
+        }
+    }
 }
 
 /// The mean squared residual of the active correspondences of a truncated loss, `dimension` residuals each.
@@ -43,7 +108,7 @@ pub(super) fn planar_covariance<T: Real>(
 ) -> Option<SMatrix<T, 8, 8>> {
     let h = scales.transfer(&(rotation + t * n.transpose()));
     // The model is h scaled to length 1; a step of h moves it by its part orthogonal to h, scaled alike.
-    let scale = T::ONE / crate::real::sqrt(h.norm_squared());
+    let scale = T::ONE / sqrt(h.norm_squared());
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
     let basis = tangent_basis(n);
     let mut steps = [Matrix3::zeros(); 8];

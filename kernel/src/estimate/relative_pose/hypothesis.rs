@@ -65,14 +65,14 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         squared
     }
 
-    /// Squared residuals of a block in units of the squared threshold; of a point behind a camera, 1.
+    /// Squared residuals of a block in units of the squared threshold; of a point behind a camera, the largest number.
     #[inline(always)]
     fn squared_in_front(&self, block: &B, model: &PoseModel<T>, view: &View<T>) -> Lanes<T> {
         let mut squared = self.squared(block, &view.matrix, view.scale);
         if squared[0] < T::ONE || squared[1] < T::ONE || squared[2] < T::ONE || squared[3] < T::ONE {
             let front = model.admits(block);
             for l in 0..LANES {
-                squared[l] = if front[l] { squared[l] } else { T::ONE };
+                squared[l] = if front[l] { squared[l] } else { T::MAX };
             }
         }
         squared

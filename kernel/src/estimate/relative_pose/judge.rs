@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::super::chance::{EXPLAINED_SIGMAS, beyond_chance, line_accident};
 use super::super::degenerate::{few_distinct, list, on_a_line};
-use super::covariance::{covariance, variance};
+use super::covariance::{PsiSums, Spread, covariance, variance};
 use super::evidence::{Evidence, Explained};
 use super::hypothesis::PoseProblem;
 use super::verdict::{GeneralMotion, PureRotation, RelativePoseVerdict, Unobservable};
@@ -15,7 +15,7 @@ use crate::linalg::LANES;
 use crate::real::{from_u32, lit, max, sqrt};
 use crate::refine::blocks::EpipolarBlock;
 use crate::refine::homography::{RotationModel, transfer_sq};
-use crate::refine::lm::{Manifold, Minimum};
+use crate::refine::lm::Manifold;
 use crate::refine::relative_pose::PoseModel;
 use crate::robust::loss::Loss;
 use crate::robust::{Estimator, Gate, ScoreCounts};
@@ -39,6 +39,8 @@ pub(super) struct Judgement<T: Real> {
 /// Error of an inlier in two dimensions over the threshold: as likely for a true correspondence as the threshold is in
 /// one (chi-squared at 95 %: sqrt(5.99 / 3.84)).
 const PLANE_THRESHOLD: f64 = 1.25;
+/// Inliers of which a line is believed where they agree with a pose no better than chance.
+const LEAST_LINE: usize = 15;
 
 impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     /// The chance of a wrong correspondence to be an inlier.
@@ -61,16 +63,22 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         let problem = self.problem;
         let count = problem.data.count as u32;
         let mut refined = self.refine(best);
-        let accident = problem.accident(&refined.model, self.accident());
-        let inliers = self.mark(&refined.model, mask);
-        let noise = self.noise(&refined);
+        let accident = problem.accident(&refined, self.accident());
+        let inliers = self.mark(&refined, mask);
+        let noise = self.spread(&refined).noise;
         if !beyond_chance(count, inliers, 5, accident) {
-            mask.iter_mut().for_each(|inlier| *inlier = false);
-            let verdict = if !beyond_chance(count, count, 5, accident) {
+            // Of points on one line even wrong pairs may agree.
+            let indices = list(mask, order);
+            let line =
+                indices.len() > LEAST_LINE && on_a_line(problem.data, indices, self.sigma, self.accident());
+            let verdict = if line {
+                RelativePoseVerdict::Unobservable(Unobservable::Collinear)
+            } else if !beyond_chance(count, count, 5, self.accident()) {
                 RelativePoseVerdict::TooFewInliers
             } else {
                 self.without_model()
             };
+            mask.iter_mut().for_each(|inlier| *inlier = false);
             return Judgement { verdict, noise: T::ZERO };
         }
         // Where the options promise less noise than there is, the data are believed.
@@ -83,8 +91,8 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         if on_a_line(problem.data, indices, sigma, accident) {
             return Judgement { verdict: RelativePoseVerdict::Unobservable(Unobservable::Collinear), noise };
         }
-        let evidence = Evidence { problem, inliers: mask, epipolar: refined.model.matrix(), sigma, accident };
-        if let Some(rotation) = evidence.rotation(&refined.model) {
+        let evidence = Evidence { problem, inliers: mask, epipolar: refined.matrix(), sigma, accident };
+        if let Some(rotation) = evidence.rotation(&refined) {
             let explained = evidence.explained(&rotation.matrix());
             if !evidence.proves_parallax(count, &explained, 3) {
                 let still = self.stands_still(&evidence, &rotation, &explained);
@@ -98,43 +106,69 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
             let twins = self.twins(&plane);
             for twin in &twins {
                 let other = self.refine(&pose_model(&twin.pose, problem));
-                if self.cost(&other.model) < self.cost(&refined.model) {
+                if self.cost(&other) < self.cost(&refined) {
                     refined = other;
                 }
             }
-            self.mark(&refined.model, mask);
-            let epipolar = refined.model.matrix();
+            self.mark(&refined, mask);
+            let epipolar = refined.matrix();
             let evidence = Evidence { problem, inliers: mask, epipolar, sigma, accident };
             let explained = evidence.explained(&plane.0);
             if !evidence.proves_parallax(count, &explained, 8) && !twins.is_empty() {
                 return self.planar(&plane, twins, sigma, mask);
             }
         }
-        let noise = self.noise(&refined);
-        let variance = noise * noise;
-        let motion = GeneralMotion {
-            pose: refined.model.pose(),
-            covariance: covariance(&self.final_sums(&refined), variance),
-        };
-        Judgement { verdict: RelativePoseVerdict::General(motion), noise }
+        self.general(&refined)
     }
 
     /// The pose that all inliers support, with what lies just beyond the threshold at a falling weight.
-    fn refine(&self, model: &PoseModel<T>) -> Minimum<PoseModel<T>, T, 5> {
+    fn refine(&self, model: &PoseModel<T>) -> PoseModel<T> {
         let loss = Loss::Tukey(self.problem.threshold * T::TWO);
-        self.problem.optimise(model, &loss, 10, lit(1e-6))
+        self.problem.optimise(model, &loss, 10, lit(1e-6)).model
     }
 
-    /// The sums of the inliers at a refined pose.
-    fn final_sums(&self, refined: &Minimum<PoseModel<T>, T, 5>) -> crate::refine::lm::NormalEquations<T, 5> {
-        let loss = Loss::Truncated(self.problem.threshold);
-        self.problem.optimise(&refined.model, &loss, 1, T::ZERO).equations
+    /// A pose refined from a caller's; none where too few agree with it to fix it. Writes the inlier mask.
+    pub(super) fn refined(&self, pose: &Pose<T>, mask: &mut [bool]) -> Option<GeneralMotion<T>> {
+        let mut start = pose_model(pose, self.problem);
+        let length = sqrt(start.translation.norm_squared());
+        let refined = if length > T::ZERO {
+            start.translation *= T::ONE / length;
+            Some(self.refine(&start))
+        } else {
+            None
+        };
+        let inliers = refined.map_or(0, |model| self.mark(&model, mask));
+        if inliers < 6 {
+            mask.iter_mut().for_each(|inlier| *inlier = false);
+            return None;
+        }
+        let motion = self.motion(&refined?).0;
+        motion.covariance.map(|_| motion)
     }
 
-    /// Root of the mean squared residual of the inliers.
-    fn noise(&self, refined: &Minimum<PoseModel<T>, T, 5>) -> T {
-        let limit = self.problem.threshold * self.problem.threshold;
-        sqrt(variance(&self.final_sums(refined), self.problem.data.count, limit, 1))
+    /// A refined pose with its covariance, and the noise.
+    fn motion(&self, model: &PoseModel<T>) -> (GeneralMotion<T>, T) {
+        let spread = self.spread(model);
+        let loss = Loss::Truncated(self.problem.threshold * T::TWO);
+        let sums = self.problem.optimise(model, &loss, 1, T::ZERO).equations;
+        (GeneralMotion { pose: model.pose(), covariance: covariance(&sums, spread.variance) }, spread.noise)
+    }
+
+    /// A refined pose as a verdict, and the noise.
+    fn general(&self, model: &PoseModel<T>) -> Judgement<T> {
+        let (motion, noise) = self.motion(model);
+        Judgement { verdict: RelativePoseVerdict::General(motion), noise }
+    }
+
+    /// The spread of the residuals about a refined pose under its loss.
+    fn spread(&self, model: &PoseModel<T>) -> Spread<T> {
+        let mut sums = PsiSums::default();
+        let quarter: T = lit(0.25);
+        self.problem.for_each_block(model, |_, squared, filled| {
+            // The loss ends at two thresholds.
+            squared.iter().take(filled).for_each(|&s| sums.add(s * quarter));
+        });
+        sums.spread(self.problem.threshold * T::TWO, 5)
     }
 
     pub(super) fn cost(&self, model: &PoseModel<T>) -> T {

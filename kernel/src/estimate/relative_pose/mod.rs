@@ -5,8 +5,8 @@ use nalgebra::Vector2;
 use super::error::TwoViewError;
 use super::load::{Units, check_pixels, load_bearings, load_planes};
 use super::workspace::RelativePoseWorkspace;
-use crate::Real;
-use crate::geometry::CameraModel;
+use crate::{InputError, Real};
+use crate::geometry::{CameraModel, Pose};
 use crate::linalg::LANES;
 use crate::refine::blocks::{BearingBlock, BlockSlice, EpipolarBlock, PlaneBlock};
 use crate::robust::budget::check_noise;
@@ -99,6 +99,30 @@ pub fn relative_pose_guided<T: Real>(
 ) -> Result<RelativePoseEstimate<T>, RelativePoseError> {
     let sigma_px = check_noise(options.max_error_px, options.sigma_px)?;
     options.ransac.check()?;
+    let lens = load(camera1, camera2, x1, x2, &guide, workspace)?;
+    Ok(match lens {
+        Lens::Rectilinear(units) => estimate::<T, PlaneBlock<T>>(units, sigma_px, options, guide, workspace),
+        Lens::Wide(units) => estimate::<T, BearingBlock<T>>(units, sigma_px, options, guide, workspace),
+    })
+}
+
+/// Into which blocks the correspondences were loaded.
+enum Lens<T> {
+    /// Points of two planes.
+    Rectilinear(Units<T>),
+    /// Bearings.
+    Wide(Units<T>),
+}
+
+/// Checks the input and loads it; nothing is touched in case of an error.
+fn load<T: Real>(
+    camera1: &impl CameraModel<T>,
+    camera2: &impl CameraModel<T>,
+    x1: &[Vector2<T>],
+    x2: &[Vector2<T>],
+    guide: &Guide<'_, T>,
+    workspace: &mut RelativePoseWorkspace<'_, T>,
+) -> Result<Lens<T>, InputError> {
     let planes = camera1.rectilinear().zip(camera2.rectilinear());
     let capacity = match planes {
         Some(_) => workspace.capacity_of::<PlaneBlock<T>>(),
@@ -108,15 +132,64 @@ pub fn relative_pose_guided<T: Real>(
     guide.check(x1.len())?;
     workspace.count = x1.len();
     Ok(match planes {
-        Some((a, b)) => {
-            let units = load_planes(camera1, camera2, [a, b], x1, x2, workspace);
-            estimate::<T, PlaneBlock<T>>(units, sigma_px, options, guide, workspace)
-        }
-        None => {
-            let units = load_bearings(camera1, camera2, x1, x2, workspace);
-            estimate::<T, BearingBlock<T>>(units, sigma_px, options, guide, workspace)
-        }
+        Some((a, b)) => Lens::Rectilinear(load_planes(camera1, camera2, [a, b], x1, x2, workspace)),
+        None => Lens::Wide(load_bearings(camera1, camera2, x1, x2, workspace)),
     })
+}
+
+/// A relative pose refined on all correspondences that agree with it, and its covariance; none where fewer than six do or
+/// they leave a direction open.
+///
+/// The Sampson errors in pixels under Tukey's loss, which ends at twice `max_error_px`, over the five degrees of freedom
+/// of the pose, by Levenberg and Marquardt's method with analytic derivatives.
+///
+/// # Input
+/// Cameras and pixels as [`relative_pose`] takes them; a pose with a translation that is not zero, of any length.
+///
+/// # Returns
+/// The pose with |t| = 1, and the 5x5 covariance; [`TwoViewWorkspace::inliers`](super::TwoViewWorkspace::inliers) is the mask
+/// of its inliers.
+///
+/// # Errors
+/// [`RelativePoseError`], with everything untouched.
+///
+/// # Cost
+/// At most 10 passes over the correspondences.
+///
+/// # References
+/// P. Sampson, "Fitting conic sections to very scattered data", 1982; A. Beaton, J. Tukey, "The fitting of power series",
+/// Technometrics, 1974 (the loss).
+pub fn refine_relative_pose<T: Real>(
+    camera1: &impl CameraModel<T>,
+    camera2: &impl CameraModel<T>,
+    x1: &[Vector2<T>],
+    x2: &[Vector2<T>],
+    pose: &Pose<T>,
+    options: &RelativePoseOptions<T>,
+    workspace: &mut RelativePoseWorkspace<'_, T>,
+) -> Result<Option<GeneralMotion<T>>, RelativePoseError> {
+    check_noise(options.max_error_px, options.sigma_px)?;
+    let lens = load(camera1, camera2, x1, x2, &Guide::none(), workspace)?;
+    Ok(match lens {
+        Lens::Rectilinear(units) => refine::<T, PlaneBlock<T>>(units, pose, options, workspace),
+        Lens::Wide(units) => refine::<T, BearingBlock<T>>(units, pose, options, workspace),
+    })
+}
+
+fn refine<T: Real, B: EpipolarBlock<T>>(
+    units: Units<T>,
+    pose: &Pose<T>,
+    options: &RelativePoseOptions<T>,
+    workspace: &mut RelativePoseWorkspace<'_, T>,
+) -> Option<GeneralMotion<T>> {
+    let count = workspace.count;
+    let blocks = B::slice(workspace.numbers);
+    let blocks = blocks.get(..count.div_ceil(LANES)).unwrap_or(blocks);
+    let threshold = options.max_error_px / units.pixels;
+    let problem = PoseProblem::new(BlockSlice { blocks, count }, units.scales, threshold);
+    let judge = Judge { problem: &problem, sigma: threshold, seed: 0 };
+    let mask = workspace.inliers.get_mut(..count).unwrap_or_default();
+    judge.refined(pose, mask)
 }
 
 /// The smallest consensus of interest to the search; the verdict asks for more where chance demands it.

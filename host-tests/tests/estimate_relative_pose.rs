@@ -1,0 +1,347 @@
+//! `estimate::relative_pose`: the truth, the verdicts, malformed input, determinism, budgets, covariance.
+
+use epipole::estimate::{
+    RelativePoseError, RelativePoseOptions, RelativePoseVerdict, Unobservable, refine_relative_pose,
+    relative_pose, relative_pose_guided,
+};
+use epipole::geometry::pose::tangent_basis;
+use epipole::geometry::{BrownConrady, CameraModel, KannalaBrandt, Pinhole};
+use epipole::nalgebra::{Point3, SVector, Vector2};
+use epipole::real::lit;
+use epipole::robust::{Guide, OptionsError, StopReason};
+use epipole::{InputError, Real};
+use epipole_host_tests::matchers::pose_error;
+use epipole_host_tests::scenes::{Motion, Scene, Shape};
+use epipole_host_tests::two_view::{Memory, estimate_pixels, estimate_scene, scene_camera};
+use epipole_host_tests::{Rng, for_each_case, share_of};
+
+fn options<T: Real>() -> RelativePoseOptions<T> {
+    RelativePoseOptions::default()
+}
+
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+
+fn noisy(motion: Motion, shape: Shape) -> Scene {
+    Scene::new(motion, 120).shape(shape).noise_px(0.5).outliers(0.3)
+}
+
+fn recovers_general_motion<T: Real>() {
+    for motion in [Motion::General, Motion::Forward, Motion::Small] {
+        let share = share_of(40, |seed, _| {
+            let problem = noisy(motion, Shape::Volume).generate(seed);
+            let (estimate, mask) = estimate_scene::<T>(&problem, &options()).unwrap();
+            let agree = mask.iter().zip(&problem.inlier).filter(|(a, b)| a == b).count();
+            assert_eq!(estimate.report.inliers as usize, mask.iter().filter(|&&m| m).count());
+            let RelativePoseVerdict::General(found) = estimate.verdict else { return false };
+            let (r, t) = pose_error(&found.pose, &problem.pose);
+            r < 0.5 * DEGREE && t < 5.0 * DEGREE && agree >= 108
+        });
+        assert!(share.value() >= 0.95, "{motion:?}: {share:?}");
+    }
+}
+
+/// The right verdict on every seed, never a general pose.
+fn degenerate_scenes<T: Real>() {
+    type Right<T> = fn(&RelativePoseVerdict<T>) -> bool;
+    let cases: [(Motion, Shape, f64, Right<T>); 6] = [
+        (Motion::PureRotation, Shape::Volume, 0.3, |v| matches!(v, RelativePoseVerdict::PureRotation(_))),
+        (Motion::Still, Shape::Volume, 0.3, |v| matches!(v, RelativePoseVerdict::NoMotion)),
+        (Motion::General, Shape::Line, 0.3, |v| {
+            matches!(v, RelativePoseVerdict::Unobservable(Unobservable::Collinear))
+        }),
+        (Motion::General, Shape::Repeated(3), 0.0, |v| {
+            matches!(v, RelativePoseVerdict::Unobservable(Unobservable::TooFewDistinct))
+        }),
+        (Motion::General, Shape::Repeated(1), 0.0, |v| {
+            matches!(v, RelativePoseVerdict::Unobservable(Unobservable::TooFewDistinct))
+        }),
+        (Motion::General, Shape::Volume, 1.0, |v| matches!(v, RelativePoseVerdict::NoConsensus)),
+    ];
+    for (motion, shape, outliers, right) in cases {
+        let share = share_of(15, |seed, _| {
+            let problem = noisy(motion, shape).outliers(outliers).generate(seed);
+            let mut options = options::<T>();
+            options.ransac.budget.max_iterations = 2000;
+            let (estimate, _) = estimate_scene(&problem, &options).unwrap();
+            right(&estimate.verdict)
+        });
+        assert!(share.failed.is_empty(), "{motion:?} {shape:?} {outliers}: {share:?}");
+    }
+}
+
+/// Planar scenes: the truth among the twins, the plane's normal with it.
+fn planar_scenes<T: Real>() {
+    let share = share_of(40, |seed, _| {
+        let problem = noisy(Motion::General, Shape::Plane).generate(seed);
+        let (estimate, _) = estimate_scene::<T>(&problem, &options()).unwrap();
+        let RelativePoseVerdict::Planar(poses) = &estimate.verdict else { return false };
+        let (normal, distance) = problem.plane.unwrap();
+        poses.iter().any(|twin| {
+            let (r, t) = pose_error(&twin.pose, &problem.pose);
+            let n = twin.normal.map(Real::to_f64);
+            let ratio = problem.pose.translation.vector.norm() / distance;
+            r < 2.0 * DEGREE
+                && t < 8.0 * DEGREE
+                && n.angle(&normal) < 10.0 * DEGREE
+                && (twin.baseline_over_distance.to_f64() / ratio - 1.0).abs() < 0.2
+                && twin.covariance.is_some_and(|c| (0..8).all(|i| c[(i, i)] > T::ZERO))
+        })
+    });
+    assert!(share.value() >= 0.85, "{share:?}");
+}
+
+fn bits<T: Real>(estimate: &epipole::estimate::RelativePoseEstimate<T>) -> String {
+    // Debug output of floats is exact.
+    format!("{estimate:?}")
+}
+
+/// The same bits on repeated runs, whatever the capacity, and for a run that the caller ended.
+fn determinism<T: Real>() {
+    let problem = noisy(Motion::General, Shape::Volume).outliers(0.6).generate(5);
+    let (x1, x2) = problem.pixels::<T>();
+    let camera = scene_camera::<T>();
+    let run = |capacity: usize, limit: u32, asked: Option<u32>| {
+        let mut memory = Memory::new(capacity);
+        let mut workspace = memory.workspace();
+        let mut options = options::<T>();
+        options.ransac.budget.max_iterations = limit;
+        let mut answers = 0;
+        let mut keep_going = |_: &_| {
+            answers += 1;
+            asked.is_none_or(|n| answers < n)
+        };
+        let mut guide = Guide::none();
+        guide.keep_going = Some(&mut keep_going);
+        let estimate =
+            relative_pose_guided(&camera, &camera, &x1, &x2, &options, guide, &mut workspace).unwrap();
+        (estimate, workspace.inliers().to_vec())
+    };
+    let first = run(120, 10_000, None);
+    assert_eq!(bits(&first.0), bits(&run(120, 10_000, None).0));
+    assert_eq!(bits(&first.0), bits(&run(1000, 10_000, None).0));
+    let mut ended = run(120, 10_000, Some(3));
+    assert_eq!(ended.0.report.stop, StopReason::Interrupted);
+    assert_eq!(ended.0.report.spent.iterations, 3 * Guide::<T>::INTERVAL);
+    let repeated = run(120, ended.0.report.spent.iterations, None);
+    assert_eq!(repeated.0.report.stop, StopReason::MaxIterations);
+    ended.0.report.stop = StopReason::MaxIterations;
+    assert_eq!((bits(&ended.0), &ended.1), (bits(&repeated.0), &repeated.1));
+}
+
+/// Scores that rank the inliers first find the pose in fewer iterations.
+fn ranked_sampling<T: Real>() {
+    let (mut uniform, mut ranked) = (0, 0);
+    for_each_case(10, |seed, _| {
+        let problem = noisy(Motion::General, Shape::Volume).outliers(0.7).generate(seed);
+        let (x1, x2) = problem.pixels::<T>();
+        let scores: Vec<T> =
+            problem.inlier.iter().map(|&inlier| if inlier { T::ZERO } else { T::ONE }).collect();
+        let camera = scene_camera::<T>();
+        let mut memory = Memory::new(120);
+        let mut workspace = memory.workspace();
+        let mut options = options::<T>();
+        options.ransac.budget.max_iterations = 60;
+        let plain = relative_pose(&camera, &camera, &x1, &x2, &options, &mut workspace).unwrap();
+        let mut guide = Guide::none();
+        guide.scores = Some(&scores);
+        let guided =
+            relative_pose_guided(&camera, &camera, &x1, &x2, &options, guide, &mut workspace).unwrap();
+        let solved = |e: &epipole::estimate::RelativePoseEstimate<T>| {
+            e.pose().is_some_and(|pose| pose_error(&pose, &problem.pose).1 < 5.0 * DEGREE)
+        };
+        uniform += solved(&plain) as u32;
+        ranked += solved(&guided) as u32;
+    });
+    assert!(ranked >= 9 && ranked > uniform, "{ranked} {uniform}");
+}
+
+fn malformed_input<T: Real>() {
+    let problem = noisy(Motion::General, Shape::Volume).generate(1);
+    let (x1, x2) = problem.pixels::<T>();
+    let camera = scene_camera::<T>();
+    let mut memory = Memory::new(120);
+    let mut workspace = memory.workspace();
+    let _ = relative_pose(&camera, &camera, &x1, &x2, &options(), &mut workspace).unwrap();
+    let before = workspace.inliers().to_vec();
+    let nan = lit::<T>(f64::NAN);
+    let mut check = |x1: &[Vector2<T>], x2: &[Vector2<T>], options: &RelativePoseOptions<T>| {
+        let error = relative_pose(&camera, &camera, x1, x2, options, &mut workspace).unwrap_err();
+        assert_eq!(workspace.inliers(), before, "{error}");
+        assert!(!error.to_string().is_empty());
+        error
+    };
+    let with = |x: &[Vector2<T>], index: usize, value: T| {
+        let mut x = x.to_vec();
+        x[index].y = value;
+        x
+    };
+    let input = |error| RelativePoseError::Input(error);
+    assert_eq!(
+        check(&with(&x1, 7, nan), &x2, &options()),
+        input(InputError::NotFinite { array: 0, index: 7 })
+    );
+    assert_eq!(
+        check(&x1, &with(&x2, 119, T::ONE / T::ZERO), &options()),
+        input(InputError::NotFinite { array: 1, index: 119 })
+    );
+    assert_eq!(check(&x1[..9], &x2, &options()), input(InputError::LengthMismatch { first: 9, second: 120 }));
+    assert_eq!(check(&x1[..4], &x2[..4], &options()), input(InputError::TooFew { given: 4, needed: 5 }));
+    let many = vec![Vector2::zeros(); 541];
+    assert_eq!(check(&many, &many, &options()), input(InputError::TooMany { given: 541, capacity: 120 }));
+    type Spoil<T> = fn(&mut RelativePoseOptions<T>);
+    let spoils: [(Spoil<T>, OptionsError); 6] = [
+        (|o| o.max_error_px = T::ZERO, OptionsError::MaxError),
+        (|o| o.max_error_px = lit::<T>(f64::NAN), OptionsError::MaxError),
+        (|o| o.sigma_px = Some(-T::ONE), OptionsError::Sigma),
+        (|o| o.ransac.confidence = T::ONE, OptionsError::Confidence),
+        (|o| o.ransac.confidence = T::ZERO, OptionsError::Confidence),
+        (|o| o.ransac.budget.max_iterations = 0, OptionsError::NoIterations),
+    ];
+    for (spoil, error) in spoils {
+        let mut options = options();
+        spoil(&mut options);
+        assert_eq!(check(&x1, &x2, &options), RelativePoseError::Options(error));
+    }
+}
+
+/// Extreme but finite pixels end in a verdict with finite numbers.
+fn extreme_numbers<T: Real>() {
+    for_each_case(30, |_, rng| {
+        let scale = 10f64.powf(rng.range(-30.0, 18.0));
+        let mut pixel = || Vector2::new(rng.normal(), rng.normal()).map(|v| lit::<T>(v * scale));
+        let x1: Vec<_> = (0..20).map(|_| pixel()).collect();
+        let x2: Vec<_> = (0..20).map(|_| pixel()).collect();
+        let mut options = options::<T>();
+        options.ransac.budget.max_iterations = 100;
+        let (estimate, _) = estimate_pixels(&x1, &x2, &options).unwrap();
+        if let Some(pose) = estimate.pose() {
+            assert!(pose.to_homogeneous().iter().all(|v| epipole::real::is_finite(*v)));
+        }
+    });
+}
+
+fn budgets<T: Real>() {
+    let problem = noisy(Motion::General, Shape::Volume).outliers(0.9).generate(3);
+    let mut options = options::<T>();
+    options.ransac.budget.max_residuals = 5_000;
+    let (estimate, _) = estimate_scene(&problem, &options).unwrap();
+    assert_eq!(estimate.report.stop, StopReason::MaxResiduals);
+    // One sample's ten hypotheses, scored twice, and one refinement of 15 passes beyond the budget.
+    assert!(estimate.report.spent.residuals <= 5_000 + (20 + 17) * 120);
+    options.ransac.budget.max_residuals = u64::MAX;
+    options.ransac.budget.max_solver_calls = 13;
+    let (estimate, _) = estimate_scene(&problem, &options).unwrap();
+    assert_eq!((estimate.report.stop, estimate.report.spent.solver_calls), (StopReason::MaxSolverCalls, 13));
+    assert!(estimate.report.miss_probability <= T::ONE);
+    assert!(estimate.report.excluded_inlier_ratio > lit::<T>(0.5));
+}
+
+macro_rules! both {
+    ($($name:ident),*) => {
+        mod f32 { $(#[test] fn $name() { super::$name::<f32>() })* }
+        mod f64 { $(#[test] fn $name() { super::$name::<f64>() })* }
+    };
+}
+both!(
+    recovers_general_motion,
+    degenerate_scenes,
+    planar_scenes,
+    determinism,
+    ranked_sampling,
+    malformed_input,
+    extreme_numbers,
+    budgets
+);
+
+/// Distorted and fisheye cameras: the threshold is in pixels of each, and the pose is found.
+#[test]
+fn lenses() {
+    let pinhole = Pinhole::new(400.0, 410.0, 320.0, 240.0).unwrap();
+    let radial = BrownConrady::new(pinhole, [-0.28, 0.07, 2e-4, -1e-4, 0.0]).unwrap();
+    let fisheye = KannalaBrandt::new(pinhole, [-0.02, 0.01, -0.005, 0.001]).unwrap();
+    fn solve(
+        camera1: &impl CameraModel<f64>,
+        camera2: &impl CameraModel<f64>,
+        rng: &mut Rng,
+    ) -> Option<(f64, f64)> {
+        let truth = epipole::geometry::Pose::new(rng.direction() * 0.8, rng.direction() * 0.15);
+        let (mut x1, mut x2) = (Vec::new(), Vec::new());
+        while x1.len() < 150 {
+            let point = Point3::new(rng.range(-3.0, 3.0), rng.range(-2.0, 2.0), rng.range(3.0, 9.0));
+            let (Some(p), Some(q)) =
+                (camera1.project(&point.coords), camera2.project(&(truth * point).coords))
+            else {
+                continue;
+            };
+            let mut noise = || Vector2::new(rng.normal(), rng.normal()) * 0.3;
+            x1.push(p + noise());
+            x2.push(q + noise());
+            if x1.len() % 4 == 0 {
+                *x2.last_mut().unwrap() = Vector2::new(rng.range(0.0, 640.0), rng.range(0.0, 480.0));
+            }
+        }
+        let mut memory = Memory::new(150);
+        let mut workspace = memory.workspace();
+        let estimate =
+            relative_pose(camera1, camera2, &x1, &x2, &RelativePoseOptions::default(), &mut workspace)
+                .unwrap();
+        estimate.pose().map(|pose| pose_error(&pose, &truth))
+    }
+    let share = share_of(20, |_, rng| {
+        [
+            solve(&radial, &radial, rng),
+            solve(&fisheye, &fisheye, rng),
+            solve(&pinhole, &fisheye, rng),
+            solve(&radial, &pinhole, rng),
+        ]
+        .iter()
+        .all(|e| e.is_some_and(|(r, t)| r < 0.5 * DEGREE && t < 4.0 * DEGREE))
+    });
+    assert!(share.value() >= 0.9, "{share:?}");
+}
+
+/// The covariance is calibrated: the normalised squared error of a pose has its 5 degrees of freedom as its mean.
+#[test]
+fn covariance_is_calibrated() {
+    for (threshold, least, most) in [(1.5, 4.6, 5.4), (1.0, 4.6, 5.4)] {
+        let (mut sum, mut trials) = (0.0, 0);
+        for_each_case(500, |seed, _| {
+            let problem = Scene::new(Motion::General, 100).noise_px(0.5).generate(seed);
+            let (x1, x2) = problem.pixels::<f64>();
+            let camera = scene_camera();
+            let mut options = options();
+            options.max_error_px = threshold;
+            let mut memory = Memory::new(100);
+            let mut workspace = memory.workspace();
+            let refined =
+                refine_relative_pose(&camera, &camera, &x1, &x2, &problem.pose, &options, &mut workspace);
+            let found = refined.unwrap().unwrap();
+            let w = (problem.pose.rotation * found.pose.rotation.inverse()).scaled_axis();
+            let t = problem.pose.translation.vector.normalize();
+            let d = tangent_basis(&found.pose.translation.vector).transpose() * t;
+            let error = SVector::<f64, 5>::new(w.x, w.y, w.z, d.x, d.y);
+            let information = found.covariance.unwrap().try_inverse().unwrap();
+            sum += (error.transpose() * information * error).x;
+            trials += 1;
+        });
+        let mean = sum / trials as f64;
+        assert!((least..most).contains(&mean), "threshold {threshold}: {mean}");
+    }
+}
+
+/// The covariance of a pure rotation is calibrated too.
+#[test]
+fn rotation_covariance_is_calibrated() {
+    let (mut sum, mut trials) = (0.0, 0);
+    for_each_case(500, |seed, _| {
+        let problem = Scene::new(Motion::PureRotation, 60).noise_px(0.5).generate(seed);
+        let (estimate, _) = estimate_scene::<f64>(&problem, &options()).unwrap();
+        if let RelativePoseVerdict::PureRotation(found) = &estimate.verdict {
+            let w = (problem.pose.rotation * found.rotation.inverse()).scaled_axis();
+            sum += (w.transpose() * found.covariance.unwrap().try_inverse().unwrap() * w).x;
+            trials += 1;
+        }
+    });
+    let mean = sum / trials as f64;
+    assert!(trials >= 490 && (2.5..3.5).contains(&mean), "{trials} {mean}");
+}
