@@ -39,6 +39,9 @@ pub(super) struct Judgement<T: Real> {
 /// Error of an inlier in two dimensions over the threshold: as likely for a true correspondence as the threshold is in
 /// one (chi-squared at 95 %: sqrt(5.99 / 3.84)).
 const PLANE_THRESHOLD: f64 = 1.25;
+/// A plane must explain so many in twenty of the pose's inliers to be the verdict; of a planar scene it explains all but
+/// accidents.
+const PLANE_SHARE_OF_20: u32 = 17;
 /// Inliers of which a line is believed where they agree with a pose no better than chance.
 const LEAST_LINE: usize = 15;
 
@@ -114,7 +117,8 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
             let epipolar = refined.matrix();
             let evidence = Evidence { problem, inliers: mask, epipolar, sigma, accident };
             let explained = evidence.explained(&plane.0);
-            if !evidence.proves_parallax(count, &explained, 8) && !twins.is_empty() {
+            let share = explained.inliers * 20 >= (explained.inliers + explained.others) * PLANE_SHARE_OF_20;
+            if share && !evidence.proves_parallax(count, &explained, 8) && !twins.is_empty() {
                 return self.planar(&plane, twins, sigma, mask);
             }
         }

@@ -5,12 +5,12 @@ use nalgebra::Vector2;
 use super::error::TwoViewError;
 use super::load::{Units, check_pixels, load_bearings, load_planes};
 use super::workspace::RelativePoseWorkspace;
-use crate::{InputError, Real};
 use crate::geometry::{CameraModel, Pose};
 use crate::linalg::LANES;
 use crate::refine::blocks::{BearingBlock, BlockSlice, EpipolarBlock, PlaneBlock};
 use crate::robust::budget::check_noise;
 use crate::robust::{Guide, RansacOptions, rank_by_score, ransac};
+use crate::{InputError, Real};
 
 mod covariance;
 mod evidence;
