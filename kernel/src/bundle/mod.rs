@@ -23,7 +23,7 @@
 //! be far away. Points are kept as XYZ.
 //!
 //! # Memory
-//! `f32`, 8 frames, 100 points, 681 observations: 23.9 kB for everything one optimisation needs, and 4.9 kB more for
+//! `f32`, 8 frames, 100 points, 681 observations: less than 24 kB for everything one optimisation needs, 4.9 kB more for
 //! the prior. An observation takes 16 bytes.
 //!
 //! # Examples
