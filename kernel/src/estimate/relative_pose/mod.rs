@@ -47,7 +47,44 @@ impl<T: Real> Default for RelativePoseOptions<T> {
 pub type RelativePoseError = TwoViewError;
 
 /// The pose of view 2 in the frame of view 1 from pixel correspondences, many of which may be wrong, or why there is
-/// none.
+/// none: `X2 = R X1 + t`, |t| = 1.
+///
+/// Five-point hypotheses that keep their points in front of both cameras, scored by the truncated squared Sampson error
+/// `r^2 = c^2 / (|J1' E' f2|^2 + |J2' E f1|^2)`, `c = f2' E f1`, in pixels, the Jacobians J being those of the bearings (or
+/// of the points of the plane z = 1) by the pixels; refined on their inliers with five degrees of freedom. Then the
+/// simplest of no motion, a rotation, a plane and a general motion that the data leave standing is the verdict: a
+/// simpler model falls where correspondences that it does not explain agree with the pose more often than chance (at most
+/// 0.01 accidents expected; the chance is measured on mispaired correspondences), or where the errors along the epipolar
+/// lines are larger than those across. A model explains what lies within 5 sigma, where sigma is the larger of the
+/// option's and of the one that the residuals show.
+///
+/// # Input
+/// Cameras, and at least 5 pixels of each view, at most the workspace's capacity. A pixel that a lens model does not
+/// reach is an outlier.
+///
+/// # Returns
+/// A verdict with covariances, and a report; after it the workspace's `inliers()` is the mask of the verdict's model.
+///
+/// # Errors
+/// [`RelativePoseError`], with everything untouched.
+///
+/// # Degeneracies
+/// See [`RelativePoseVerdict`]: none of them ends in a general pose. A plane is the verdict where it explains at least
+/// 17 in 20 inliers; no motion where the mean square motion is below the noise.
+///
+/// # Accuracy
+/// That of a maximum-likelihood fit to the inliers (Tukey's loss, ending at two thresholds), in `f32` as in `f64`.
+///
+/// # Cost
+/// At most `max_iterations` samples, by itself as many as the confidence needs for the inliers found; beyond a budget at
+/// most one sample's hypotheses and one refinement (15 passes over the data), and the verdict's passes.
+///
+/// # References
+/// D. Nister, "An efficient solution to the five-point relative pose problem", TPAMI 2004 (the minimal problem);
+/// P. Sampson, "Fitting conic sections to very scattered data", 1982 (the error); the engine:
+/// [`ransac`](crate::robust::ransac); the verdicts: P. Torr, "An assessment of information criteria for motion model
+/// selection", CVPR 1997, and L. Moisan, B. Stival, "A probabilistic criterion to detect rigid point matches between two
+/// images", IJCV 2004.
 ///
 /// # Examples
 /// ```
