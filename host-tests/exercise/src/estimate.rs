@@ -6,7 +6,7 @@ use epipole::estimate::{
     GravityPrior, HomographyOptions, HomographyVerdict, RelativePoseEstimate, RelativePoseOptions,
     RelativePoseVerdict, TwoViewStorage, TwoViewWorkspace, WideAbsolutePoseStorage, WideTwoViewStorage,
     absolute_pose, absolute_pose_guided, fundamental, fundamental_guided, homography, homography_guided,
-    relative_pose, relative_pose_guided,
+    refine_relative_pose, relative_pose, relative_pose_guided,
 };
 use epipole::geometry::{Camera, CameraModel};
 use epipole::nalgebra::Vector2;
@@ -103,6 +103,11 @@ fn relative<T: Real>(source: &mut Source<'_>, sink: &mut Sink, workspace: &mut T
     let guide = Guide { scores: scores.get(..x1.len()), keep_going: Some(&mut keep_going) };
     if let Ok(estimate) = relative_pose_guided(&camera1, &camera2, x1, x2, &options, guide, workspace) {
         take(&estimate, sink);
+    }
+    let start = source.pose();
+    if let Ok(Some(motion)) = refine_relative_pose(&camera1, &camera2, x1, x2, &start, &options, workspace) {
+        sink.finite_pose(&motion.pose);
+        sink.finite(motion.covariance.iter().flatten());
     }
     for &inlier in workspace.inliers() {
         sink.flag(inlier);
