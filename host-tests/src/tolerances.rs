@@ -88,4 +88,9 @@ table! {
         "distance of unit-norm E; two solutions nearer than this are one, beyond it not the same";
     FOLDED_GRAM: 3e-6, 6e-15,
         "elements of R'R relative to the trace of A'A; the rounding of nine reflections a block, 24 rows in blocks of 3";
+    ROBUST_EXACT_PX: 2e-2, 1e-7,
+        "pixels; exact points, in f32 rounded to 1e-4 of a pixel, extrapolated to the rim of the plane; the end of the \
+         refinement";
+    ROBUST_SAME_PX: 5e-2, 2e-2,
+        "pixels; the same estimate from pixels in another unit: the last step of the refinement was shorter than this";
 }

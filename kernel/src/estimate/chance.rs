@@ -5,7 +5,7 @@
 //! number of false alarms).
 
 use crate::Real;
-use crate::linalg::LANES;
+use crate::linalg::{LANES, Lanes};
 use crate::real::{from_u32, lit, ln, max, min};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock};
 use crate::robust::log_binomial_tail;
@@ -72,6 +72,33 @@ pub(super) fn point_accident<T: Real, B: EpipolarBlock<T>>(data: BlockSlice<'_, 
     let (a, b) = sides(data);
     let disc = lit::<T>(core::f64::consts::PI) * radius * radius;
     if a * b > disc { disc / (a * b) } else { T::ONE }
+}
+
+/// The share of wrong correspondences that a model explains by accident, measured on the correspondences themselves with
+/// view 2 of another in place of their own; never below `least`. `squared` gives the squared errors of a block in units of
+/// the squared threshold.
+pub(super) fn measured_accident<T: Real, B: EpipolarBlock<T>>(
+    data: BlockSlice<'_, B>,
+    least: T,
+    squared: impl Fn(&B) -> Lanes<T>,
+) -> T {
+    let full = data.blocks.get(..data.count / LANES).unwrap_or(data.blocks);
+    let (mut hits, mut seen) = (0u32, 0u32);
+    for shift in [full.len() / 2, full.len() / 3, full.len() / 5] {
+        // Blocks of the list and of the list turned by `shift`, but not a block with itself.
+        if shift == 0 {
+            continue;
+        }
+        let (start, end) = full.split_at_checked(shift).unwrap_or((full, &[]));
+        for (block, other) in full.iter().zip(end.iter().chain(start)) {
+            for s in squared(&block.mispaired(other)) {
+                hits += (s < T::ONE) as u32;
+            }
+            seen += LANES as u32;
+        }
+    }
+    let share = from_u32::<T>(hits + 2) / from_u32(seen + 2);
+    if seen > 0 && share > least { share } else { least }
 }
 
 /// The two longer sides of the box around the points or bearings of view 2, the shorter of them first.

@@ -1,6 +1,6 @@
 //! Configurations of image points from which no model follows: one line, too few distinct points.
 
-use super::chance::{EXPLAINED_SIGMAS, beyond_chance};
+use super::chance::{EXPLAINED_SIGMAS, beyond_chance, line_accident};
 use crate::Real;
 use crate::linalg::LANES;
 use crate::real::{lit, sqrt};
@@ -94,9 +94,31 @@ pub(super) fn on_a_line<T: Real, B: EpipolarBlock<T>>(
     sigma: T,
     accident: T,
 ) -> bool {
+    let outside = (data.count as u32).saturating_sub(inliers.len() as u32);
+    line_with(data, inliers, sigma, |off| !beyond_chance(outside + off, off, 2, accident))
+}
+
+/// True where at least half of all correspondences, and more than chance explains, lie on one line in both views,
+/// although no model may agree with them.
+pub(super) fn mostly_on_a_line<T: Real, B: EpipolarBlock<T>>(
+    data: BlockSlice<'_, B>,
+    all: &[u32],
+    sigma: T,
+) -> bool {
+    let band = line_accident(data, sigma * lit(EXPLAINED_SIGMAS));
+    let count = all.len() as u32;
+    line_with(data, all, sigma, |off| 2 * off <= count && beyond_chance(count, count - off, 2, band))
+}
+
+/// True where an acceptable number of the inliers lie off some line of least squares.
+fn line_with<T: Real, B: EpipolarBlock<T>>(
+    data: BlockSlice<'_, B>,
+    inliers: &[u32],
+    sigma: T,
+    acceptable: impl Fn(u32) -> bool,
+) -> bool {
     let total = inliers.len() as u32;
     let limit = sigma * sigma * lit(EXPLAINED_SIGMAS * EXPLAINED_SIGMAS);
-    let outside = (data.count as u32).saturating_sub(total);
     let mut sampler = Sampler::<T>::uniform(0, total);
     for k in 0..LINES {
         let Some([i, j]) = sampler.sample::<2>(k) else { return false };
@@ -109,8 +131,7 @@ pub(super) fn on_a_line<T: Real, B: EpipolarBlock<T>>(
         // Two noisy points give a coarse line; all near it give a good one.
         let coarse = fit(data, inliers, &first, limit * lit(9.0));
         let line = fit(data, inliers, &coarse, limit);
-        let off = off_line(data, inliers, &line, limit, total);
-        if !beyond_chance(outside + off, off, 2, accident) {
+        if acceptable(off_line(data, inliers, &line, limit, total)) {
             return true;
         }
     }
@@ -149,6 +170,7 @@ pub(super) fn few_distinct<T: Real, B: EpipolarBlock<T>>(
     let mut centres = [[T::ZERO; 4]; DISTINCT];
     let mut sizes = [0u32; DISTINCT];
     let mut used = 0usize;
+    let mut many = false;
     let mut total = 0u32;
     for index in inliers {
         let Some(p) = point(data, index) else { continue };
@@ -162,14 +184,36 @@ pub(super) fn few_distinct<T: Real, B: EpipolarBlock<T>>(
                 break;
             }
         }
-        if !known {
-            let (Some(centre), Some(size)) = (centres.get_mut(used), sizes.get_mut(used)) else {
-                return false;
-            };
-            *centre = p;
-            *size = 1;
-            used += 1;
+        if known {
+            continue;
         }
+        match (centres.get_mut(used), sizes.get_mut(used)) {
+            (Some(centre), Some(size)) => {
+                *centre = p;
+                *size = 1;
+                used += 1;
+            }
+            // Points beyond the list's end count as not repeated.
+            _ => many = true,
+        }
+    }
+    // A model through repeated points can be bent to meet some accidents: nine in ten are too many.
+    let mut falling = [0u32; DISTINCT];
+    for mut size in sizes {
+        for largest in &mut falling {
+            if size > *largest {
+                core::mem::swap(largest, &mut size);
+            }
+        }
+    }
+    let held: u32 = falling.iter().take(needed as usize - 1).filter(|&&size| size > 1).sum();
+    if total > 0 && held >= total - total / 10 {
+        return true;
+    }
+    // Many distinct points, most of them repeated: a homography or a fundamental matrix can be bent to the others; a pose
+    // of five points, which they must see in front of both cameras, cannot.
+    if many && (needed == 5 || 3 * held < 2 * total) {
+        return false;
     }
     // Given the most repeated points, each of which takes the place of one of a minimal sample: do the rest agree more
     // often than chance?
@@ -187,11 +231,47 @@ pub(super) fn few_distinct<T: Real, B: EpipolarBlock<T>>(
         }
         rest = rest.saturating_sub(largest);
         let wrong = (data.count as u32).saturating_sub(total);
-        if !beyond_chance(rest + wrong, rest, needed - taken, accident) && largest > 1 {
+        let repeated = largest > 1 && 2 * rest <= total;
+        if repeated && !beyond_chance(rest + wrong, rest, needed - taken, accident) {
             return true;
         }
     }
     total > 0 && used < needed as usize
+}
+
+/// True where repetitions of fewer than `needed` distinct points hold at least half of all correspondences, and more than
+/// chance explains, although no model may agree with them.
+pub(super) fn few_repeated<T: Real, B: EpipolarBlock<T>>(
+    data: BlockSlice<'_, B>,
+    needed: u32,
+    sigma: T,
+    accident: T,
+) -> bool {
+    let count = data.count as u32;
+    let radius = sigma * lit(REPEATED_SIGMAS);
+    let near = |p: &Point<T>, c: &Point<T>| p.iter().zip(c).all(|(a, b)| crate::real::abs(*a - *b) < radius);
+    let mut centres: [Option<Point<T>>; DISTINCT] = [None; DISTINCT];
+    // The sizes of the largest repetitions, falling.
+    let mut sizes = [0u32; DISTINCT];
+    let mut sampler = Sampler::<T>::uniform(0, count);
+    for k in 0..DISTINCT as u32 {
+        let Some(centre) = sampler.sample::<1>(k).and_then(|[index]| point(data, index)) else { continue };
+        if centres.iter().flatten().any(|other| near(&centre, other)) {
+            continue;
+        }
+        if let Some(place) = centres.iter_mut().find(|place| place.is_none()) {
+            *place = Some(centre);
+        }
+        let mut size = (0..count).filter_map(|i| point(data, i)).map(|p| near(&p, &centre) as u32).sum();
+        for largest in &mut sizes {
+            if size > *largest {
+                core::mem::swap(largest, &mut size);
+            }
+        }
+    }
+    let held = sizes.iter().take(needed as usize - 1).filter(|&&size| size > 1).sum();
+    // The band or disc of an accident has a radius of a few standard deviations, a repetition of some more.
+    2 * held >= count && beyond_chance(count, held, needed, crate::real::min(accident * lit(12.0), T::ONE))
 }
 
 /// Writes the indices of the set entries of a mask, in order.

@@ -26,17 +26,16 @@ pub(super) struct PixelFrame<T> {
 }
 
 /// The median of a short list.
-fn median<T: Real>(mut values: [T; LOOKED_AT]) -> T {
-    // Constant bounds, so that no index is checked.
-    for _ in 1..LOOKED_AT {
-        for j in 1..LOOKED_AT {
-            let (a, b) = (values[j - 1], values[j]);
-            if b < a {
-                (values[j - 1], values[j]) = (b, a);
+fn median<T: Real>(values: [T; LOOKED_AT]) -> T {
+    let mut rising = [T::MAX; LOOKED_AT];
+    for mut value in values {
+        for entry in &mut rising {
+            if value < *entry {
+                core::mem::swap(entry, &mut value);
             }
         }
     }
-    values[LOOKED_AT / 2]
+    rising[LOOKED_AT / 2]
 }
 
 impl<T: Real> PixelFrame<T> {

@@ -61,8 +61,10 @@ pub(crate) fn transfer_sq<T: Real>(h: &Matrix3<T>, block: &PlaneBlock<T>, weight
     squared
 }
 
-/// Index of the pair (i, j) among 00, 01, 11, 02, 12, 22.
-const PAIR: [[usize; 3]; 3] = [[0, 1, 3], [1, 2, 4], [3, 4, 5]];
+/// The symmetric 3x3 array of its entries 00, 01, 11, 02, 12, 22.
+fn symmetric<X: Copy>([a, b, c, d, e, f]: [X; 6]) -> [[X; 3]; 3] {
+    [[a, b, d], [b, c, e], [d, e, f]]
+}
 
 /// Sums of a pass, lane by lane.
 struct Sums<T> {
@@ -172,8 +174,11 @@ where
     let total = |lanes: &Lanes<T>| (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
     let mut products = [[T::ZERO; 6]; 6];
     for (totals, lanes) in products.iter_mut().zip(&sums.products) {
-        *totals = [0, 1, 2, 3, 4, 5].map(|k: usize| total(&lanes[k]));
+        for (sum, lanes) in totals.iter_mut().zip(lanes) {
+            *sum = total(lanes);
+        }
     }
+    let products = symmetric(products.map(symmetric));
     let slopes = sums.slopes.map(|row| row.map(|lanes| total(&lanes)));
     let tangents = model.tangents();
     let mut hessian = SMatrix::<T, P, P>::zeros();
@@ -185,7 +190,7 @@ where
                 let mut sum = T::ZERO;
                 for k in 0..3 {
                     for m in 0..3 {
-                        sum += products[PAIR[i][k]][PAIR[j][m]] * tangents[q][3 * k + m];
+                        sum += products[i][k][j][m] * tangents[q][3 * k + m];
                     }
                 }
                 image[3 * i + j] = sum;

@@ -4,8 +4,8 @@ use super::hypothesis::{EpipolarProblem, ParallaxProblem};
 use super::verdict::FundamentalVerdict;
 use crate::Real;
 use crate::estimate::Unobservable;
-use crate::estimate::chance::{EXPLAINED_SIGMAS, beyond_chance, line_accident};
-use crate::estimate::degenerate::{few_distinct, list, on_a_line};
+use crate::estimate::chance::{EXPLAINED_SIGMAS, beyond_chance, line_accident, measured_accident};
+use crate::estimate::degenerate::{few_distinct, few_repeated, list, mostly_on_a_line, on_a_line};
 use crate::estimate::frame::PixelFrame;
 use crate::estimate::transfer::TransferProblem;
 use crate::linalg::LANES;
@@ -54,9 +54,9 @@ impl<T: Real> Judge<'_, '_, T> {
         let all = list(mask, order);
         let verdict = if !beyond_chance(count, count, 7, accident) {
             FundamentalVerdict::TooFewInliers
-        } else if few_distinct(data, all.iter().copied(), 7, self.sigma, accident) {
+        } else if few_repeated(data, 7, self.sigma, accident) {
             FundamentalVerdict::Unobservable(Unobservable::TooFewDistinct)
-        } else if on_a_line(data, all, self.sigma, accident) {
+        } else if mostly_on_a_line(data, all, self.sigma) {
             FundamentalVerdict::Unobservable(Unobservable::Collinear)
         } else {
             FundamentalVerdict::NoConsensus
@@ -74,8 +74,11 @@ impl<T: Real> Judge<'_, '_, T> {
     ) -> (FundamentalVerdict<T>, T) {
         let data = self.problem.data;
         let count = data.count as u32;
-        let accident = self.accident();
         let mut model = self.refine(best);
+        let scale = self.problem.scale();
+        let accident = measured_accident(data, self.accident(), |block| {
+            self.problem.squared(block, &model.matrix, scale)
+        });
         let inliers = self.mark(&model, mask);
         if !beyond_chance(count, inliers, 7, accident) {
             return (self.without_model(mask, order), T::ZERO);

@@ -105,15 +105,16 @@ pub(super) fn covariance<T: Real>(
     let m = &model.0.data.0;
     let tangents = model.tangents();
     let mut jacobian = SMatrix::<T, 8, 8>::zeros();
-    for (k, &[x, y]) in corners.iter().enumerate() {
-        let inverse_z = T::ONE / (m[0][2] * x + m[1][2] * y + m[2][2]);
-        let u = (m[0][0] * x + m[1][0] * y + m[2][0]) * inverse_z;
-        let v = (m[0][1] * x + m[1][1] * y + m[2][1]) * inverse_z;
-        for (p, t) in tangents.iter().enumerate() {
-            let at = |i: usize| t[3 * i] * x + t[3 * i + 1] * y + t[3 * i + 2];
-            let z = at(2);
-            jacobian.data.0[p][2 * k] = (at(0) - u * z) * inverse_z;
-            jacobian.data.0[p][2 * k + 1] = (at(1) - v * z) * inverse_z;
+    for (column, t) in jacobian.data.0.iter_mut().zip(&tangents) {
+        for (pair, &[x, y]) in column.as_chunks_mut::<2>().0.iter_mut().zip(corners) {
+            let inverse_z = T::ONE / (m[0][2] * x + m[1][2] * y + m[2][2]);
+            let u = (m[0][0] * x + m[1][0] * y + m[2][0]) * inverse_z;
+            let v = (m[0][1] * x + m[1][1] * y + m[2][1]) * inverse_z;
+            let z = t[6] * x + t[7] * y + t[8];
+            *pair = [
+                (t[0] * x + t[1] * y + t[2] - u * z) * inverse_z,
+                (t[3] * x + t[4] * y + t[5] - v * z) * inverse_z,
+            ];
         }
     }
     // Singular where the corners themselves determine no homography.

@@ -2,8 +2,8 @@
 
 use nalgebra::Vector2;
 
-use super::chance::{beyond_chance, point_accident};
-use super::degenerate::{few_distinct, list, on_a_line};
+use super::chance::{beyond_chance, measured_accident, point_accident};
+use super::degenerate::{few_distinct, few_repeated, list, mostly_on_a_line, on_a_line};
 use super::error::TwoViewError;
 use super::frame::PixelFrame;
 use super::load::check_pixels;
@@ -38,11 +38,11 @@ pub type HomographyWorkspace<'a, T> = TwoViewWorkspace<'a, T>;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct HomographyOptions<T> {
-    /// Largest error of an inlier, pixels: the first-order distance of the correspondence, four coordinates, from the
-    /// homography. Where the images have one scale, the distance between transferred and measured point is sqrt 2 times
-    /// that. Default 3.
+    /// Largest transfer error of an inlier, pixels: where the homography keeps scale, the distance in view 2 between
+    /// transferred and measured point; else that distance relative to what the noise of both views makes of it (sqrt 2
+    /// times the distance of the correspondence, four coordinates, from the homography to first order). Default 3.
     pub max_error_px: T,
-    /// Standard deviation of the noise of one image coordinate, pixels. Default: half of `max_error_px`.
+    /// Standard deviation of the noise of one image coordinate, pixels. Default: a third of `max_error_px`.
     pub sigma_px: Option<T>,
     /// Confidence, iterations, budgets and seed.
     pub ransac: RansacOptions<T>,
@@ -125,7 +125,8 @@ pub fn homography_guided<T: Real>(
     guide: Guide<'_, T>,
     workspace: &mut HomographyWorkspace<'_, T>,
 ) -> Result<HomographyEstimate<T>, HomographyError> {
-    let sigma_px = check_noise(options.max_error_px, options.sigma_px)?;
+    let sigma_px = options.sigma_px.unwrap_or(options.max_error_px / lit(3.0));
+    let sigma_px = check_noise(options.max_error_px, Some(sigma_px))?;
     options.ransac.check()?;
     check_pixels(x1, x2, 4, workspace.capacity())?;
     guide.check(x1.len())?;
@@ -135,7 +136,8 @@ pub fn homography_guided<T: Real>(
     let blocks = blocks.get(..count.div_ceil(LANES)).unwrap_or(blocks);
     let problem = TransferProblem {
         data: BlockSlice { blocks, count },
-        threshold: options.max_error_px / frame.pixels,
+        // The noise of both views is in the distance between transferred and measured point.
+        threshold: options.max_error_px / frame.pixels * lit(core::f64::consts::FRAC_1_SQRT_2),
         subset: None,
     };
     let order = match guide.scores {
@@ -163,6 +165,12 @@ const LEAST_INLIERS: u32 = 8;
 /// Passes over the data of the last refinement.
 const FINAL_PASSES: u32 = 8;
 
+/// Inliers in a box of this many standard deviations are one point.
+const POINT_SIGMAS: f64 = 8.0;
+
+/// Where the weight of the last refinement vanishes, in thresholds.
+const FINAL_SUPPORT: f64 = 2.8;
+
 struct Judge<'a, 'b, T: Real> {
     problem: &'a TransferProblem<'b, T, PlaneBlock<T>>,
     /// Standard deviation of a coordinate in the blocks' unit, as the options have it.
@@ -185,9 +193,9 @@ impl<T: Real> Judge<'_, '_, T> {
         let all = list(mask, order);
         let verdict = if !beyond_chance(count, count, 4, accident) {
             HomographyVerdict::TooFewInliers
-        } else if few_distinct(data, all.iter().copied(), 4, self.sigma, accident) {
+        } else if few_repeated(data, 4, self.sigma, accident) {
             HomographyVerdict::Unobservable(Unobservable::TooFewDistinct)
-        } else if on_a_line(data, all, self.sigma, accident) {
+        } else if mostly_on_a_line(data, all, self.sigma) {
             HomographyVerdict::Unobservable(Unobservable::Collinear)
         } else {
             HomographyVerdict::NoConsensus
@@ -205,8 +213,8 @@ impl<T: Real> Judge<'_, '_, T> {
     ) -> (HomographyVerdict<T>, T) {
         let problem = self.problem;
         let data = problem.data;
-        // What lies just beyond the threshold takes part at a falling weight.
-        let support = problem.threshold * T::TWO;
+        // What lies beyond the threshold takes part at a falling weight: of Gaussian noise nothing is lost.
+        let support = problem.threshold * lit(FINAL_SUPPORT);
         let minimum = problem.optimise(best, &Loss::Tukey(support), FINAL_PASSES, lit(1e-4));
         let Some(model) = HomographyModel::new(&minimum.model.0) else {
             return (self.without_model(mask, order), T::ZERO);
@@ -220,7 +228,12 @@ impl<T: Real> Judge<'_, '_, T> {
         let noise = sqrt(scatter.variance());
         let sigma = max(self.sigma, noise);
         let indices = list(mask, order);
-        if few_distinct(data, indices.iter().copied(), 4, sigma, accident) {
+        // A homography through repeated points agrees with any pairing of them.
+        let scale = T::ONE / (problem.threshold * problem.threshold);
+        let mispaired = measured_accident(data, accident, |block: &PlaneBlock<T>| {
+            transfer_sq(&model.0, block, &[scale; LANES])
+        });
+        if few_distinct(data, indices.iter().copied(), 4, sigma, mispaired) {
             return (HomographyVerdict::Unobservable(Unobservable::TooFewDistinct), noise);
         }
         if on_a_line(data, indices, sigma, accident) {
@@ -230,6 +243,11 @@ impl<T: Real> Judge<'_, '_, T> {
             return (self.without_model(mask, order), T::ZERO);
         };
         let corners = corners(data, &model, mask);
+        // One point of view 1, spread by the noise over as many of view 2 as a wild homography likes.
+        let (width, height) = (corners[2][0] - corners[0][0], corners[2][1] - corners[0][1]);
+        if max(width, height) < sigma * lit(POINT_SIGMAS) {
+            return (HomographyVerdict::Unobservable(Unobservable::TooFewDistinct), noise);
+        }
         let found = FoundHomography {
             homography,
             corners: corners.map(|corner| to_pixels(self.frame, corner)),
