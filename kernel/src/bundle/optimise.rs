@@ -218,6 +218,8 @@ impl<T: Real> Window<'_, T> {
             evaluations: observed,
         };
         let least_damping = T::EPSILON * lit(8.0);
+        // Without noise every iteration halves what is left: no share of it would end the descent.
+        let negligible = from_u32::<T>(observed) * lit(NEGLIGIBLE);
         let mut growth = T::TWO;
         let mut current = true;
         report.termination = loop {
@@ -241,7 +243,7 @@ impl<T: Real> Window<'_, T> {
             current = false;
             let tried = problem.try_step(damping);
             if let Some(Tried { change, promised, lost_sight }) = tried {
-                let small = options.cost_tolerance * cost;
+                let small = options.cost_tolerance * max(cost, negligible);
                 let gain = -change / promised;
                 if !lost_sight && change < T::ZERO && gain > lit(1e-3) {
                     problem.accept();
@@ -293,6 +295,8 @@ impl<T: Real> Window<'_, T> {
 }
 
 const CURVED: f64 = 1e-3;
+/// The squared residual, in variances of its noise, that is as good as none: a thirtieth of a standard deviation.
+const NEGLIGIBLE: f64 = 1e-3;
 
 /// The window's slices while it is optimised.
 struct Problem<'a, T: Real> {

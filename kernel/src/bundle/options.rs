@@ -32,7 +32,8 @@ pub struct BundleOptions<T> {
     /// Evaluations of observations at the most, three to an observation and iteration: the budget of time. An
     /// iteration that would go beyond it is not begun.
     pub max_evaluations: u32,
-    /// Converged where an iteration lowers the cost by less than this share of it.
+    /// Converged where an iteration lowers the cost by less than this share of it, or of what residuals of a thirtieth
+    /// of their standard deviation would cost.
     pub cost_tolerance: T,
     /// Damping of the first iteration, relative to the diagonal.
     pub initial_damping: T,
