@@ -30,7 +30,7 @@ pub struct Budget {
     /// Minimal problems solved (degenerate samples cost none). Default: no limit.
     pub max_solver_calls: u32,
     /// Residuals evaluated, of one correspondence under one model each. Default: no limit. The work done beyond it
-    /// is at most one hypothesis and one refinement.
+    /// is at most the hypotheses of one sample and one refinement.
     pub max_residuals: u64,
 }
 

@@ -68,12 +68,17 @@ impl<T: Real> Sampler<T> {
         Self { growth, ..Self::uniform(seed, count) }
     }
 
-    /// The sample of an iteration: `S` distinct numbers below `count`, none where `count < S`.
+    /// The sample of an iteration: `S` distinct numbers below `count`, none where `count < S` or the sampler was
+    /// ranked for smaller samples.
     ///
     /// Iterations must be asked for in order where the sampler is ranked.
     #[inline]
     pub fn sample<const S: usize>(&mut self, iteration: u32) -> Option<[u32; S]> {
         if (self.count as u64) < S as u64 || S == 0 {
+            return None;
+        }
+        // A sampler ranked for smaller samples has too small a pool for these.
+        if self.growth.as_ref().is_some_and(|growth| (growth.pool as u64) < S as u64) {
             return None;
         }
         let key = mix(self.seed.wrapping_add((iteration as u64).wrapping_mul(STEP)));
