@@ -74,7 +74,6 @@ pub(crate) fn scoring<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
     }
     let mut list = epipole::Solutions::<T, 2>::new();
     sink.flag(list.push(tally.cost()));
-    sink.flag(Score::<T>::worst().cost > score.cost);
 }
 
 /// The value that most numbers are near to, from samples of two.

@@ -56,12 +56,13 @@ fn main() -> ExitCode {
             functions += 1;
             lines += body.len();
             run_lines += run;
-            // A `const fn` that only the compiler runs has no lines to count.
-            let share = if body.is_empty() { 0.0 } else { run as f64 / body.len() as f64 };
+            // A function of a macro has its lines where the macro is called.
+            let share =
+                if body.is_empty() && counts.is_some() { 1.0 } else { run as f64 / body.len() as f64 };
             if share < 1.0 {
                 println!("{:5.1} %  {suffix}:{} {}", 100.0 * share, function.body.start(), function.name);
             }
-            if share < NEEDED {
+            if !(share >= NEEDED) {
                 poor.push(format!("{suffix}:{} {}", function.body.start(), function.name));
             }
         }

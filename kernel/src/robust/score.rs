@@ -13,14 +13,6 @@ pub struct Score<T> {
     pub inliers: u32,
 }
 
-impl<T: Real> Score<T> {
-    /// Worse than every score.
-    #[must_use]
-    pub fn worst() -> Self {
-        Self { cost: T::MAX, inliers: 0 }
-    }
-}
-
 /// When to give a hypothesis up before all its residuals are known: as soon as its cost exceeds the best model's, or
 /// when Wald's sequential test holds that its inlier ratio is that of a wrong model.
 ///
