@@ -62,7 +62,8 @@ fn main() -> ExitCode {
             if share < 1.0 {
                 println!("{:5.1} %  {suffix}:{} {}", 100.0 * share, function.body.start(), function.name);
             }
-            if !(share >= NEEDED) {
+            // Equal getters are merged into one by the optimiser, and only one of them is counted: shown, no failure.
+            if !(share >= NEEDED) && body.len() > 3 {
                 poor.push(format!("{suffix}:{} {}", function.body.start(), function.name));
             }
         }
