@@ -1,4 +1,6 @@
 //! The pose of a calibrated camera from pixels of known points.
+//!
+//! Longer than other files: options, error, entry points and the judgement share one flow, whose pieces no other file calls.
 
 use core::fmt;
 
