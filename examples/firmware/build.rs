@@ -31,7 +31,10 @@ fn main() {
         "microbit" => Some("62.5"),
         _ => None,
     };
-    println!("cargo:rustc-check-cfg=cfg(qemu_arm)");
+    println!("cargo:rustc-check-cfg=cfg(qemu_arm, small_ram)");
+    if board == "microbit" {
+        println!("cargo:rustc-cfg=small_ram");
+    }
     if let Some(tick_ns) = tick_ns {
         println!("cargo:rustc-cfg=qemu_arm");
         println!("cargo:rustc-env=TICK_NS={tick_ns}");

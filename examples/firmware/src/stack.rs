@@ -1,8 +1,8 @@
 //! High water of the stack: the free part is painted, the call is made, and what is no longer painted was used.
 
 const PAINT: u32 = 0xE91B_01E5;
-/// Left unpainted below the stack pointer: the frames of this module's own functions.
-const OWN: usize = 256;
+/// Left unpainted below the frame of [`high_water`], so that painting cannot reach it.
+const OWN: usize = 32;
 
 unsafe extern "C" {
     /// End of the static data, by the linker scripts of cortex-m-rt and riscv-rt.
@@ -33,11 +33,18 @@ pub fn high_water<R>(most: usize, call: impl FnOnce() -> R) -> (R, usize) {
         unsafe { (at as *mut u32).write_volatile(PAINT) };
         at += 4;
     }
-    let answer = call();
+    // An interrupt's frame is none of the call's.
+    let answer = critical_section::with(|_| outlined(call));
     let mut at = bottom;
     // SAFETY: as above.
     while at < top && unsafe { (at as *const u32).read_volatile() } == PAINT {
         at += 4;
     }
     (answer, top + OWN - at)
+}
+
+/// In a frame of its own, so that all of the call's frames lie in the painted part.
+#[inline(never)]
+fn outlined<R>(call: impl FnOnce() -> R) -> R {
+    call()
 }
