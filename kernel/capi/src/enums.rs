@@ -1,0 +1,97 @@
+//! Enumerations. A struct holds their values as `uint32_t`; an unknown value of an input is an error.
+
+/// A robust estimation asks, before every eighth iteration: may I go on? A window before every one. 0 means no.
+/// `context` is what the caller gave.
+pub type KeepGoing = Option<unsafe extern "C" fn(context: *mut core::ffi::c_void, iterations: u32) -> i32>;
+
+/// The lens of a camera, and what `distortion` holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum CameraModel {
+    /// No distortion.
+    Pinhole = 0,
+    /// Radial and tangential distortion: `k1 k2 p1 p2 k3`, OpenCV's order.
+    BrownConrady = 1,
+    /// Fisheye: `k1 k2 k3 k4`, OpenCV's `fisheye`.
+    KannalaBrandt = 2,
+}
+
+/// How a point of two views is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum TriangulationMethod {
+    /// The middle of the shortest line between the rays: fastest.
+    Midpoint = 0,
+    /// The null vector of the homogeneous system.
+    Dlt = 1,
+    /// Least reprojection error on the planes z = 1; bearings with `z <= 0` have none.
+    Optimal = 2,
+}
+
+/// What rays determine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum TriangulationVerdict {
+    /// A point in front of every view.
+    Point = 0,
+    /// The best fit lies behind a view.
+    Behind = 1,
+    /// Parallel rays: the unit direction in place of a point.
+    AtInfinity = 2,
+    /// Nothing: no baseline, rays along it, or numbers out of range. Zeros in place of a point.
+    Undetermined = 3,
+}
+
+/// What two views say about the motion between them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum RelativePoseVerdict {
+    /// A general motion: `poses[0]`, covariance 5x5.
+    General = 0,
+    /// All inliers on one plane: one or two poses, the more likely first, each with its plane and an 8x8 covariance.
+    Planar = 1,
+    /// The camera turned in place: the rotation of `poses[0]`, its translation zero; covariance 3x3.
+    PureRotation = 2,
+    /// Every inlier stayed where it was.
+    NoMotion = 3,
+    /// The inliers agree, and no pose follows: see `unobservable`.
+    Unobservable = 4,
+    /// Something agrees, on no more correspondences than chance explains.
+    TooFewInliers = 5,
+    /// No model explains more correspondences than chance.
+    NoConsensus = 6,
+    /// A verdict that this version of the header does not name.
+    Other = 7,
+}
+
+/// Why inliers that agree fix no model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Unobservable {
+    /// The verdict is another.
+    No = 0,
+    /// They lie on one line in an image.
+    Collinear = 1,
+    /// They are repetitions of too few distinct points.
+    TooFewDistinct = 2,
+    /// A reason that this version of the header does not name.
+    Other = 3,
+}
+
+/// Why a search ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum StopReason {
+    /// The confidence was reached.
+    Confident = 0,
+    /// `max_iterations` was reached.
+    MaxIterations = 1,
+    /// `max_solver_calls` was reached.
+    MaxSolverCalls = 2,
+    /// `max_residuals` was reached.
+    MaxResiduals = 3,
+    /// The caller answered no. The same input with `max_iterations` set to the reported iterations gives the same bits.
+    Interrupted = 4,
+    /// A reason that this version of the header does not name.
+    Other = 5,
+}

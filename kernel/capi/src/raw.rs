@@ -1,0 +1,201 @@
+//! A caller's pointers into slices and values, after every check that their bits allow.
+//!
+//! Nothing is written before all checks of a call have passed, so an error leaves the caller's memory as it was.
+
+use core::marker::PhantomData;
+use core::ops::Range;
+
+use epipole::nalgebra::SVector;
+
+use crate::Status;
+
+/// Types of plain numbers: any bits are a value, and C sees the same layout.
+///
+/// # Safety
+/// As said, without exception.
+pub(crate) unsafe trait Plain: Copy {}
+
+// SAFETY: numbers.
+unsafe impl Plain for f32 {}
+// SAFETY: numbers.
+unsafe impl Plain for f64 {}
+// SAFETY: numbers.
+unsafe impl Plain for u8 {}
+// SAFETY: numbers.
+unsafe impl Plain for u32 {}
+// SAFETY: an array has no bits but those of its elements.
+unsafe impl<T: Plain, const N: usize> Plain for [T; N] {}
+// SAFETY: `repr(C)` over a transparent array of N numbers.
+unsafe impl<T: Plain, const N: usize> Plain for SVector<T, N> {}
+
+const _: () = {
+    assert!(size_of::<SVector<f32, 2>>() == 8 && align_of::<SVector<f32, 2>>() == align_of::<f32>());
+    assert!(size_of::<SVector<f64, 3>>() == 24 && align_of::<SVector<f64, 3>>() == align_of::<f64>());
+};
+
+/// The addresses of some memory.
+pub(crate) type Bytes = Range<usize>;
+
+/// The addresses of `count` elements, which could be a slice.
+fn bytes_of<V>(pointer: *const V, count: usize) -> Result<Bytes, Status> {
+    if pointer.is_null() {
+        return Err(Status::NullPointer);
+    }
+    if !pointer.is_aligned() {
+        return Err(Status::Misaligned);
+    }
+    let size = count.checked_mul(size_of::<V>()).filter(|&size| size <= isize::MAX as usize);
+    let start = pointer.addr();
+    let end = size.and_then(|size| start.checked_add(size)).ok_or(Status::TooLarge)?;
+    Ok(start..end)
+}
+
+/// An array that the caller lends for reading.
+#[derive(Clone, Copy)]
+pub(crate) struct Input<'a, V> {
+    pub(crate) slice: &'a [V],
+}
+
+impl<'a, V: Plain> Input<'a, V> {
+    /// `count` elements of `V`, given as its numbers.
+    ///
+    /// # Safety
+    /// A pointer that is not null points to as many elements, which nobody writes for `'a`.
+    pub(crate) unsafe fn new<S>(pointer: *const S, count: usize) -> Result<Self, Status> {
+        let pointer = pointer.cast::<V>();
+        bytes_of(pointer, count)?;
+        // SAFETY: not null, aligned, of a possible size; the rest is the caller's promise.
+        Ok(Self { slice: unsafe { core::slice::from_raw_parts(pointer, count) } })
+    }
+
+    /// None for a null pointer, where the function has a meaning for it.
+    ///
+    /// # Safety
+    /// As [`new`](Self::new).
+    pub(crate) unsafe fn nullable<S>(pointer: *const S, count: usize) -> Result<Option<Self>, Status> {
+        if pointer.is_null() {
+            return Ok(None);
+        }
+        // SAFETY: passed on.
+        unsafe { Self::new(pointer, count).map(Some) }
+    }
+
+    pub(crate) fn bytes(&self) -> Bytes {
+        let range = self.slice.as_ptr_range();
+        range.start.addr()..range.end.addr()
+    }
+
+    /// The first element.
+    pub(crate) fn value(&self) -> Result<V, Status> {
+        self.slice.first().copied().ok_or(Status::TooFew)
+    }
+}
+
+/// An array that the caller lends for writing. It is not read, and may be uninitialised.
+pub(crate) struct Output<'a, V> {
+    pointer: *mut V,
+    capacity: usize,
+    written: usize,
+    bytes: Bytes,
+    lent: PhantomData<&'a mut V>,
+}
+
+impl<V: Plain> Output<'_, V> {
+    /// `capacity` elements of `V`, given as its numbers.
+    ///
+    /// # Safety
+    /// A pointer that is not null points to memory for as many elements, which nobody else uses for the lifetime.
+    pub(crate) unsafe fn new<S>(pointer: *mut S, capacity: usize) -> Result<Self, Status> {
+        let pointer = pointer.cast::<V>();
+        let bytes = bytes_of(pointer, capacity)?;
+        Ok(Self { pointer, capacity, written: 0, bytes, lent: PhantomData })
+    }
+
+    pub(crate) fn bytes(&self) -> Bytes {
+        self.bytes.clone()
+    }
+
+    /// Writes the next element; nothing beyond the last.
+    pub(crate) fn push(&mut self, value: V) {
+        if self.written < self.capacity {
+            // SAFETY: below the capacity, of memory that is ours to write.
+            unsafe { self.pointer.add(self.written).write(value) };
+            self.written += 1;
+        }
+    }
+
+    /// Writes the values that fit, and tells how many were written in all.
+    pub(crate) fn write(&mut self, values: impl IntoIterator<Item = V>) -> usize {
+        values.into_iter().for_each(|value| self.push(value));
+        self.written
+    }
+}
+
+/// A struct that may grow from version to version, by fields at its end.
+///
+/// # Safety
+/// `repr(C)` of plain numbers; options begin with their size in bytes, a `u32`.
+pub(crate) unsafe trait Grows: Copy {
+    /// Its size in the first version.
+    const FIRST: usize;
+
+    /// `size`, where a version up to this one has it.
+    fn known(size: usize) -> Result<usize, Status> {
+        if size >= Self::FIRST && size <= size_of::<Self>() { Ok(size) } else { Err(Status::StructSize) }
+    }
+}
+
+/// The options at `pointer` over the defaults, which stay for what an older caller does not know, and where they lie.
+///
+/// # Safety
+/// A pointer that is not null points to a struct of the size that its first field says.
+pub(crate) unsafe fn read_options<O: Grows>(pointer: *const O, default: O) -> Result<(O, Bytes), Status> {
+    bytes_of(pointer, 1)?;
+    // SAFETY: not null, aligned; the first field is a `u32`.
+    let size = O::known(unsafe { pointer.cast::<u32>().read() } as usize)?;
+    let mut options = default;
+    // SAFETY: `size` bytes are there, and no more than `O` has; any bits of them are an `O`.
+    unsafe { core::ptr::copy_nonoverlapping(pointer.cast::<u8>(), (&raw mut options).cast::<u8>(), size) };
+    Ok((options, bytes_of(pointer.cast::<u8>(), size)?))
+}
+
+/// A struct that the caller lends for writing, as large as its version knows it.
+pub(crate) struct OutputStruct<'a, E> {
+    pointer: *mut E,
+    size: usize,
+    bytes: Bytes,
+    lent: PhantomData<&'a mut E>,
+}
+
+impl<E: Grows> OutputStruct<'_, E> {
+    /// # Safety
+    /// A pointer that is not null points to `size` bytes, which nobody else uses for the lifetime.
+    pub(crate) unsafe fn new(pointer: *mut E, size: usize) -> Result<Self, Status> {
+        bytes_of(pointer, 1)?;
+        let size = E::known(size)?;
+        Ok(Self { pointer, size, bytes: bytes_of(pointer.cast::<u8>(), size)?, lent: PhantomData })
+    }
+
+    pub(crate) fn bytes(&self) -> Bytes {
+        self.bytes.clone()
+    }
+
+    /// Writes as much of the value as the caller's version has.
+    pub(crate) fn write(&mut self, value: &E) {
+        let from = (&raw const *value).cast::<u8>();
+        // SAFETY: `size` bytes are ours to write, and `E` has no fewer.
+        unsafe { core::ptr::copy_nonoverlapping(from, self.pointer.cast::<u8>(), self.size) };
+    }
+}
+
+/// No output overlaps an input or another output.
+pub(crate) fn disjoint(inputs: &[Bytes], outputs: &[Bytes]) -> Result<(), Status> {
+    let overlap = |a: &Bytes, b: &Bytes| a.start < b.end && b.start < a.end;
+    let mut rest = outputs.iter();
+    while let Some(output) = rest.next() {
+        if inputs.iter().chain(rest.clone()).any(|other| overlap(output, other)) {
+            return Err(Status::Overlap);
+        }
+    }
+    Ok(())
+}
