@@ -2,7 +2,7 @@
 
 use epipole::Real;
 use epipole::nalgebra::{Unit, UnitQuaternion, Vector3};
-use epipole::real::lit;
+use epipole::real::{lit, ln, sin_cos};
 
 /// A seeded stream of random numbers.
 #[derive(Clone, Debug)]
@@ -40,10 +40,11 @@ impl Rng {
         ((u128::from(self.next_u64()) * n as u128) >> 64) as usize
     }
 
-    /// Standard normal (Box and Muller 1958).
+    /// Standard normal (Box and Muller 1958). By the kernel's functions: the platform's differ in the last bit, and a
+    /// seed is the same problem on every host.
     pub fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.unit()).ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.unit()).cos()
+        let radius = (-2.0 * ln(1.0 - self.unit())).sqrt();
+        radius * sin_cos(std::f64::consts::TAU * self.unit()).1
     }
 
     /// Three independent standard normals.

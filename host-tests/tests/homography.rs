@@ -25,6 +25,14 @@ fn many<T: Real>(x1: &[Vector3<T>], x2: &[Vector3<T>]) -> Option<Homography<T>> 
     homography_npt(x1, x2).unwrap()
 }
 
+/// Whether three of the four points go round clockwise in one view and anticlockwise in the other.
+fn turned_over<T: Real>(x1: &[Vector3<T>], x2: &[Vector3<T>]) -> bool {
+    let turn = |x: &[Vector3<T>], [i, j, k]: [usize; 3]| x[i].cross(&x[j]).dot(&x[k]) > T::ZERO;
+    [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]
+        .into_iter()
+        .any(|triple| turn(x1, triple) != turn(x2, triple))
+}
+
 fn planar(motion: Motion, points: usize) -> Scene {
     Scene::new(motion, points).shape(Shape::Plane)
 }
@@ -89,7 +97,8 @@ in_both_scalars! {
         share_of(2000, |seed, rng| {
             let scene = planar(MOTIONS[rng.index(4)], 4).noise_px(3.0 * rng.unit()).generate(seed);
             let (x1, x2) = scene.bearings::<T>();
-            let Some(h) = four(&x1, &x2) else { return true };
+            // Noise can turn a thin triangle over, which no camera sees: then, and only then, there is no answer.
+            let Some(h) = four(&x1, &x2) else { return turned_over(&x1, &x2) };
             assert!(matrix_f64(&h.0).determinant() > 0.0);
             let last = matrix_f64(&h.0) * x1[3].map(T::to_f64) - x2[3].map(T::to_f64);
             assert!(x1.iter().zip(&x2).all(|(a, b)| (h.0 * a).dot(b) > T::ZERO));
@@ -103,7 +112,7 @@ in_both_scalars! {
         share_of(500, |seed, rng| {
             let scene = planar(MOTIONS[rng.index(4)], 4).noise_px(0.5).generate(seed);
             let (x1, x2) = scene.bearings::<T>();
-            let Some(h) = four(&x1, &x2) else { return true };
+            let Some(h) = four(&x1, &x2) else { return false };
             let order = rng.permutation(4);
             let y1: Vec<Vector3<T>> = order.iter().map(|&k| x1[k] * lit::<T>(rng.range(0.5, 2.0))).collect();
             let y2: Vec<Vector3<T>> = order.iter().map(|&k| x2[k] * lit::<T>(rng.range(0.5, 2.0))).collect();

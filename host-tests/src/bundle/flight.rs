@@ -3,6 +3,8 @@
 use epipole::geometry::Pose;
 use epipole::nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
 
+use epipole::real::sin_cos;
+
 use crate::Rng;
 
 /// Metres between frames.
@@ -30,17 +32,19 @@ impl Flight {
         let mut alive: Vec<usize> = vec![];
         for k in 0..frames {
             let angle = k as f64 * STEP / 40.0;
-            let centre = Vector3::new(40.0 * angle.cos(), 1.5 * (3.0 * angle).sin(), 40.0 * angle.sin());
-            let ahead = Vector3::new(-angle.sin(), 0.05 * (2.0 * angle).cos(), angle.cos());
+            // By the kernel's functions: the platform's differ in the last bit.
+            let (sin, cos) = sin_cos(angle);
+            let centre = Vector3::new(40.0 * cos, 1.5 * sin_cos(3.0 * angle).0, 40.0 * sin);
+            let ahead = Vector3::new(-sin, 0.05 * sin_cos(2.0 * angle).1, cos);
             let down = Vector3::y();
             let right = down.cross(&ahead).normalize();
             let down = ahead.normalize().cross(&right);
             let look =
                 Matrix3::from_rows(&[right.transpose(), down.transpose(), ahead.normalize().transpose()]);
             let sway = Rotation3::from_euler_angles(
-                0.03 * (0.7 * k as f64).sin(),
+                0.03 * sin_cos(0.7 * k as f64).0,
                 35f64.to_radians(),
-                0.05 * (0.3 * k as f64).cos(),
+                0.05 * sin_cos(0.3 * k as f64).1,
             );
             let rotation =
                 UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(sway.matrix() * look));
