@@ -92,10 +92,40 @@ fn relative_pose_and_fundamental() {
         assert!(pooled(&stdout, "auc10") > 50.0 && pooled(&stdout, "median_t_deg") < 5.0);
         assert!(pooled(&stdout, "ms_median") > 0.0);
         let csv = fs::read_to_string(folder.join("out.csv")).unwrap();
-        assert!(csv.starts_with("file,r_deg,t_deg,correspondences,inliers,iterations,ms,refusal\n"), "{csv}");
+        assert!(
+            csv.starts_with("file,r_deg,t_deg,correspondences,inliers,iterations,ms,doubt,refusal\n"),
+            "{csv}"
+        );
         assert_eq!(csv.lines().count(), 5);
         let svg = fs::read_to_string(folder.join("out.svg")).unwrap();
         assert!(svg.starts_with("<svg") && svg.contains("scene synthetic (4)"));
+    }
+}
+
+#[test]
+fn curves_of_risk_and_of_time() {
+    let folder = folder("curves");
+    for k in 0..3 {
+        pose_file(&folder.join(format!("{k}.txt")), k, 100);
+    }
+    for problem in ["relative-pose", "fundamental"] {
+        let output = evaluate(
+            &folder,
+            &[problem, ".", "--plot-risk", "risk.svg", "--plot-time", "time.svg", "--csv", "a.csv"],
+        );
+        let stdout = text(&output.stdout);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        let risk = fs::read_to_string(folder.join("risk.svg")).unwrap();
+        assert!(risk.starts_with("<svg") && risk.contains("by covariance, verdict and inliers"));
+        let time = fs::read_to_string(folder.join("time.svg")).unwrap();
+        assert!(time.starts_with("<svg") && time.contains("AUC@10 deg"));
+        let budgets: Vec<&str> = stdout.lines().filter(|line| line.starts_with("budget_ms=")).collect();
+        assert!(budgets.len() == 8 && budgets[7].contains(" auc5="), "{stdout}");
+        assert_eq!(pooled(&stdout, "files"), 3.0);
+        // Every answer has a finite doubt.
+        let csv = fs::read_to_string(folder.join("a.csv")).unwrap();
+        let doubts = csv.lines().skip(1).map(|row| row.split(',').nth(7).unwrap().parse::<f64>().unwrap());
+        assert!(doubts.clone().count() == 3 && doubts.clone().all(|d| d > 0.0 && d < 3.0), "{csv}");
     }
 }
 
@@ -117,7 +147,9 @@ fn fewer_correspondences_and_iterations_are_used_when_asked() {
     assert!(tight < loose, "{tight} {loose}");
     // The same seed gives the same row, but for the time.
     let (a, b) = (run(&["--seed", "3"]), run(&["--seed", "3"]));
-    assert_eq!((&a[..6], &a[7]), (&b[..6], &b[7]));
+    assert_eq!((&a[..6], &a[7..]), (&b[..6], &b[7..]));
+    // Without time, the first question ends it.
+    assert_eq!(run(&["--time-budget", "0", "--confidence", "0.999999"])[5], "8");
 }
 
 #[test]
@@ -195,6 +227,8 @@ fn wrong_command_lines() {
     assert_eq!(code(&["relative-pose", "a.txt", "--scalar", "f16"]), Some(2));
     assert_eq!(code(&["relative-pose", "absent.txt"]), Some(1));
     assert_eq!(code(&["relative-pose", "a.txt", "--plot", "a.png"]), Some(1));
+    assert_eq!(code(&["relative-pose", "a.txt", "--plot-risk", "a.png"]), Some(1));
+    assert_eq!(code(&["relative-pose", "a.txt", "--time-budget", "-1"]), Some(2));
     // An option that the estimator refuses is no broken file: every answer is a refusal.
     let output = evaluate(&folder, &["relative-pose", "a.txt", "--confidence", "1.5"]);
     assert_eq!(pooled(&text(&output.stdout), "fail"), 1.0);

@@ -13,12 +13,15 @@ use std::path::Path;
 use std::time::Instant;
 
 use epipole::Real;
-use epipole::estimate::{AbsolutePoseOptions, AbsolutePoseWorkspace, absolute_pose};
+use epipole::estimate::{
+    AbsolutePose, AbsolutePoseOptions, AbsolutePoseVerdict, AbsolutePoseWorkspace, absolute_pose_guided,
+};
 use epipole::nalgebra::{Matrix3, Vector2, Vector3};
 use epipole::real::lit;
+use epipole::robust::Guide;
 
 use crate::file::{BrokenFile, array, numbers};
-use crate::run::{Settings, name, next_random, pinhole};
+use crate::run::{Settings, doubt, name, next_random, pinhole, spread};
 use crate::score::{Outcome, REFUSED, rotation_error_deg};
 
 /// A file as read.
@@ -125,7 +128,10 @@ pub(crate) fn run<T: Real>(file: &AbsoluteFile, settings: &Settings) -> Outcome 
         (vec![T::ZERO; 5 * count], vec![0; count], vec![false; count]);
     let mut workspace = AbsolutePoseWorkspace::from_slices(&mut numbers, &mut order, &mut inliers);
     let start = Instant::now();
-    let answer = absolute_pose(&pinhole::<T>(file.intrinsics), &pixels, &points, &options, &mut workspace);
+    let mut keep_going = settings.keep_going(start);
+    let guide = Guide { scores: None, keep_going: Some(&mut keep_going) };
+    let camera = pinhole::<T>(file.intrinsics);
+    let answer = absolute_pose_guided(&camera, &pixels, &points, &options, guide, &mut workspace);
     let milliseconds = 1e3 * start.elapsed().as_secs_f64();
     let estimate = match answer {
         Ok(estimate) => estimate,
@@ -136,6 +142,7 @@ pub(crate) fn run<T: Real>(file: &AbsoluteFile, settings: &Settings) -> Outcome 
                 inliers: 0,
                 iterations: 0,
                 milliseconds,
+                doubt: f64::INFINITY,
                 refusal: error.to_string(),
             };
         }
@@ -151,8 +158,17 @@ pub(crate) fn run<T: Real>(file: &AbsoluteFile, settings: &Settings) -> Outcome 
         }
         None => ([REFUSED; 2], name(&estimate.verdict)),
     };
+    // The rotation's part: the translation has the unit of the points. A plane's two poses, as in two views.
+    let rotation =
+        |found: &AbsolutePose<T>| spread(found.covariance.map(|c| c.fixed_view::<3, 3>(0, 0).into_owned()));
+    let spread = match &estimate.verdict {
+        AbsolutePoseVerdict::Pose(found) => rotation(found),
+        AbsolutePoseVerdict::PlanarAmbiguity(poses) => 1.0 + poses.first().map_or(f64::INFINITY, rotation),
+        _ => f64::INFINITY,
+    };
     Outcome {
         errors,
+        doubt: doubt(spread, estimate.report.inliers, rows.len()),
         correspondences: rows.len(),
         inliers: estimate.report.inliers,
         iterations: estimate.report.spent.iterations,

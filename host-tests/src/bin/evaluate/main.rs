@@ -10,16 +10,21 @@ mod report;
 mod run;
 mod score;
 
+use std::error::Error;
 use std::fs;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 
 use clap::{Parser, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use file::Problem;
+use absolute::AbsoluteFile;
+use file::{BrokenFile, CorrespondenceFile, Problem};
+use report::Timed;
 use run::Settings;
+use score::Outcome;
 
 const FORMAT: &str = "\
 Format of a file, one item a line; lines that start with `#` are skipped, but `# size W H` gives the size of image 1:
@@ -73,12 +78,53 @@ struct Arguments {
     /// Draw the cumulative error curves (SVG).
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
+    /// Draw the share of failures among the answers that the estimate trusts most (SVG).
+    #[arg(long, value_name = "FILE")]
+    plot_risk: Option<PathBuf>,
+    /// Run all again with time budgets of 0.1 to 20 ms, and draw the areas under the curve by the time (SVG).
+    #[arg(long, value_name = "FILE")]
+    plot_time: Option<PathBuf>,
+    /// Milliseconds after which no sample is drawn any more.
+    #[arg(long, value_name = "MS", value_parser = milliseconds)]
+    time_budget: Option<Duration>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Scalar {
     F32,
     F64,
+}
+
+fn milliseconds(text: &str) -> Result<Duration, String> {
+    let number = text.parse::<f64>().map_err(|e| e.to_string())?;
+    Duration::try_from_secs_f64(1e-3 * number).map_err(|e| e.to_string())
+}
+
+/// Time budgets of the curve, milliseconds.
+const BUDGETS: [f64; 8] = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0];
+
+/// A file as read.
+enum Input {
+    TwoViews(CorrespondenceFile),
+    Absolute(AbsoluteFile),
+}
+
+impl Input {
+    fn read(path: &Path, problem: Problem) -> Result<Self, BrokenFile> {
+        match problem {
+            Problem::AbsolutePose => absolute::read(path).map(Self::Absolute),
+            _ => file::read(path, problem).map(Self::TwoViews),
+        }
+    }
+
+    fn run(&self, problem: Problem, scalar: Scalar, settings: &Settings) -> Outcome {
+        match (self, scalar) {
+            (Self::TwoViews(file), Scalar::F32) => run::run::<f32>(problem, file, settings),
+            (Self::TwoViews(file), Scalar::F64) => run::run::<f64>(problem, file, settings),
+            (Self::Absolute(file), Scalar::F32) => absolute::run::<f32>(file, settings),
+            (Self::Absolute(file), Scalar::F64) => absolute::run::<f64>(file, settings),
+        }
+    }
 }
 
 fn main() -> ExitCode {
@@ -99,10 +145,11 @@ fn evaluate(arguments: &Arguments) -> Result<ExitCode, String> {
         max_iterations: arguments.max_iterations,
         max_correspondences: arguments.max_corr,
         seed: arguments.seed,
+        time_budget: arguments.time_budget,
     };
-    if let Some(path) = &arguments.plot
-        && !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("svg"))
-    {
+    let plots = [&arguments.plot, &arguments.plot_risk, &arguments.plot_time];
+    let is_svg = |path: &&PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("svg"));
+    if let Some(path) = plots.into_iter().flatten().find(|path| !is_svg(path)) {
         return Err(format!("{}: the plot is an SVG, name it .svg", path.display()));
     }
     let mut paths = Vec::new();
@@ -113,34 +160,37 @@ fn evaluate(arguments: &Arguments) -> Result<ExitCode, String> {
         return Err("no .txt file in the folders given".into());
     }
 
-    let progress = ProgressBar::new(paths.len() as u64);
+    let passes = 1 + if arguments.plot_time.is_some() { BUDGETS.len() } else { 0 };
+    let progress = ProgressBar::new((passes * paths.len()) as u64);
     let style = "{bar:40.green/black} {pos}/{len} {eta} {msg}";
     progress.set_style(ProgressStyle::with_template(style).map_err(|e| e.to_string())?);
     if !io::stderr().is_terminal() {
         progress.set_draw_target(indicatif::ProgressDrawTarget::hidden());
     }
-    let mut outcomes = Vec::new();
-    let mut broken = 0usize;
+    let (mut inputs, mut outcomes, mut broken) = (Vec::new(), Vec::new(), 0);
     for path in &paths {
         progress.set_message(report::scene(path));
-        let outcome = match problem {
-            Problem::AbsolutePose => absolute::read(path).map(|file| match arguments.scalar {
-                Scalar::F32 => absolute::run::<f32>(&file, &settings),
-                Scalar::F64 => absolute::run::<f64>(&file, &settings),
-            }),
-            _ => file::read(path, problem).map(|file| match arguments.scalar {
-                Scalar::F32 => run::run::<f32>(problem, &file, &settings),
-                Scalar::F64 => run::run::<f64>(problem, &file, &settings),
-            }),
-        };
-        match outcome {
-            Ok(outcome) => outcomes.push((path.clone(), outcome)),
+        match Input::read(path, problem) {
+            Ok(input) => {
+                outcomes.push((path.clone(), input.run(problem, arguments.scalar, &settings)));
+                inputs.push(input);
+            }
             Err(why) => {
                 broken += 1;
                 progress.suspend(|| eprintln!("skipped {why}"));
             }
         }
         progress.inc(1);
+    }
+    let mut timed = Vec::new();
+    for budget in BUDGETS.into_iter().take(passes - 1) {
+        progress.set_message(format!("{budget} ms"));
+        let settings = Settings { time_budget: Some(Duration::from_secs_f64(1e-3 * budget)), ..settings };
+        let run = |input: &Input| {
+            progress.inc(1);
+            input.run(problem, arguments.scalar, &settings)
+        };
+        timed.push(Timed::new(problem, budget, &inputs.iter().map(run).collect::<Vec<_>>()));
     }
     progress.finish_and_clear();
 
@@ -151,8 +201,18 @@ fn evaluate(arguments: &Arguments) -> Result<ExitCode, String> {
     if let Some(path) = &arguments.csv {
         report::write_csv(path, problem, &outcomes).map_err(|e| named(path, e))?;
     }
+    let drawn = |path: &Path, result: Result<(), Box<dyn Error>>| {
+        result.map_err(|e| format!("{}: {e}", path.display()))
+    };
     if let Some(path) = &arguments.plot {
-        plot::write_svg(path, problem, &outcomes).map_err(|e| format!("{}: {e}", path.display()))?;
+        drawn(path, plot::cumulative_error(path, problem, &outcomes))?;
+    }
+    if let Some(path) = &arguments.plot_risk {
+        drawn(path, plot::risk(path, problem, &outcomes))?;
+    }
+    if let Some(path) = &arguments.plot_time {
+        drawn(path, plot::area_by_time(path, problem, &timed))?;
+        timed.iter().for_each(|t| t.print(problem));
     }
     report::print(problem, &outcomes);
     Ok(ExitCode::from(if broken > 0 { 3 } else { 0 }))

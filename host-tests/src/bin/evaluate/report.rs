@@ -105,6 +105,31 @@ pub(crate) fn print(problem: Problem, outcomes: &[(PathBuf, Outcome)]) {
     println!("{line} fail={:.4} ms_median={:.3}", s.fail, s.milliseconds);
 }
 
+/// What runs with a time budget reached.
+pub(crate) struct Timed {
+    /// The budget asked, ms.
+    pub(crate) budget: f64,
+    /// The mean time taken, ms.
+    pub(crate) milliseconds: f64,
+    pub(crate) aucs: [f64; 3],
+}
+
+impl Timed {
+    pub(crate) fn new(problem: Problem, budget: f64, outcomes: &[Outcome]) -> Self {
+        let worst: Vec<f64> = outcomes.iter().map(Outcome::worst).collect();
+        let milliseconds = outcomes.iter().map(|o| o.milliseconds).sum::<f64>() / outcomes.len() as f64;
+        Self { budget, milliseconds, aucs: scale(problem).thresholds.map(|t| auc_percent(&worst, t)) }
+    }
+
+    pub(crate) fn print(&self, problem: Problem) {
+        print!("budget_ms={} ms_mean={:.3}", self.budget, self.milliseconds);
+        for (t, auc) in scale(problem).thresholds.iter().zip(self.aucs) {
+            print!(" auc{t}={auc:.2}");
+        }
+        println!();
+    }
+}
+
 /// One line a file.
 pub(crate) fn write_csv(path: &Path, problem: Problem, outcomes: &[(PathBuf, Outcome)]) -> io::Result<()> {
     let errors = match problem {
@@ -112,19 +137,20 @@ pub(crate) fn write_csv(path: &Path, problem: Problem, outcomes: &[(PathBuf, Out
         Problem::AbsolutePose => "r_deg,position_percent",
         _ => "r_deg,t_deg",
     };
-    let mut out = format!("file,{errors},correspondences,inliers,iterations,ms,refusal\n");
+    let mut out = format!("file,{errors},correspondences,inliers,iterations,ms,doubt,refusal\n");
     for (file, o) in outcomes {
         let errors: Vec<String> =
             o.errors.iter().take(scale(problem).medians.len()).map(|e| format!("{e:.6}")).collect();
         let _ = writeln!(
             out,
-            "{},{},{},{},{},{:.4},{}",
+            "{},{},{},{},{},{:.4},{:.3e},{}",
             quoted(&file.to_string_lossy()),
             errors.join(","),
             o.correspondences,
             o.inliers,
             o.iterations,
             o.milliseconds,
+            o.doubt,
             quoted(&o.refusal)
         );
     }

@@ -1,14 +1,17 @@
 //! Runs an estimator on a file and judges its answer.
 
 use std::fmt::{Debug, Display};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use epipole::Real;
-use epipole::estimate::{self, FundamentalOptions, HomographyOptions, RelativePoseOptions, TwoViewWorkspace};
+use epipole::estimate::{
+    self, FundamentalOptions, HomographyOptions, HomographyVerdict, RelativePoseEstimate,
+    RelativePoseOptions, RelativePoseVerdict, TwoViewWorkspace,
+};
 use epipole::geometry::{CameraModel, Essential, Fundamental, Pinhole, Pose};
-use epipole::nalgebra::{Matrix3, Vector2, Vector3};
+use epipole::nalgebra::{Matrix3, SMatrix, Vector2, Vector3};
 use epipole::real::lit;
-use epipole::robust::{RansacOptions, RansacReport};
+use epipole::robust::{Guide, Progress, RansacOptions, RansacReport};
 
 use crate::file::{Correspondence, CorrespondenceFile, Problem, TruePose, Truth};
 use crate::score::{Outcome, REFUSED, direction_error_deg, rotation_error_deg, transfer_error_px};
@@ -21,6 +24,8 @@ pub(crate) struct Settings {
     pub(crate) max_iterations: Option<u32>,
     pub(crate) max_correspondences: Option<usize>,
     pub(crate) seed: u64,
+    /// After it no sample is drawn any more.
+    pub(crate) time_budget: Option<Duration>,
 }
 
 /// Judges the estimate of one file in one scalar.
@@ -79,19 +84,45 @@ fn pose_errors<T: Real>(pose: &Pose<T>, truth: &TruePose) -> [f64; 2] {
     [rotation_error_deg(&found, &truth.rotation), direction_error_deg(&t, &truth.translation)]
 }
 
-/// Errors of an answer, or why there is none.
-type Judged = Result<[f64; 2], String>;
+/// Errors of an answer and its spread, or why there is none.
+type Judged = Result<([f64; 2], f64), String>;
+
+/// The doubt of an answer: its spread over the square of the share of inliers, since a wrong model's few inliers can
+/// agree very well.
+pub(crate) fn doubt(spread: f64, inliers: u32, count: usize) -> f64 {
+    let share = f64::from(inliers) / count as f64;
+    spread / (share * share)
+}
+
+/// The root of a covariance's trace; infinite without one.
+pub(crate) fn spread<T: Real, const N: usize>(covariance: Option<SMatrix<T, N, N>>) -> f64 {
+    covariance.map_or(f64::INFINITY, |c| (0..N).map(|i| c[(i, i)].to_f64()).sum::<f64>().sqrt())
+}
+
+/// A plane's two poses explain the image alike: a radian comes on top.
+fn spread_of_pose<T: Real>(found: &RelativePoseEstimate<T>) -> f64 {
+    match &found.verdict {
+        RelativePoseVerdict::General(motion) => spread(motion.covariance),
+        RelativePoseVerdict::Planar(poses) => {
+            1.0 + poses.first().map_or(f64::INFINITY, |p| spread(p.covariance))
+        }
+        _ => f64::INFINITY,
+    }
+}
 
 /// Times an estimation; then its answer and the inlier mask are judged.
 fn judge<T: Real, A, E: Display>(
     count: usize,
-    call: impl FnOnce(&mut TwoViewWorkspace<'_, T>) -> Result<A, E>,
+    settings: &Settings,
+    call: impl FnOnce(Guide<'_, T>, &mut TwoViewWorkspace<'_, T>) -> Result<A, E>,
     read: impl FnOnce(&A, &[bool]) -> (RansacReport<T>, Judged),
 ) -> Outcome {
     let mut memory = Memory::new(count);
     let mut workspace = memory.workspace();
     let start = Instant::now();
-    let answer = call(&mut workspace);
+    let mut keep_going = settings.keep_going(start);
+    let guide = Guide { scores: None, keep_going: Some(&mut keep_going) };
+    let answer = call(guide, &mut workspace);
     let milliseconds = 1e3 * start.elapsed().as_secs_f64();
     let (inliers, iterations, errors) = match answer {
         Ok(answer) => {
@@ -100,8 +131,10 @@ fn judge<T: Real, A, E: Display>(
         }
         Err(error) => (0, 0, Err(error.to_string())),
     };
+    let (found, spread) = *errors.as_ref().unwrap_or(&([REFUSED; 2], f64::INFINITY));
     Outcome {
-        errors: *errors.as_ref().unwrap_or(&[REFUSED; 2]),
+        errors: found,
+        doubt: doubt(spread, inliers, count),
         correspondences: count,
         inliers,
         iterations,
@@ -129,9 +162,12 @@ fn relative_pose<T: Real>(
     settings.apply(&mut options.ransac);
     judge(
         x1.len(),
-        |workspace| estimate::relative_pose(&camera1, &camera2, x1, x2, &options, workspace),
+        settings,
+        |guide, workspace| {
+            estimate::relative_pose_guided(&camera1, &camera2, x1, x2, &options, guide, workspace)
+        },
         |found, _| {
-            let errors = found.pose().map(|pose| pose_errors(&pose, truth));
+            let errors = found.pose().map(|pose| (pose_errors(&pose, truth), spread_of_pose(found)));
             (found.report, errors.ok_or_else(|| name(&found.verdict)))
         },
     )
@@ -161,10 +197,12 @@ fn fundamental<T: Real>(
     };
     judge(
         x1.len(),
-        |workspace| estimate::fundamental(x1, x2, &options, workspace),
+        settings,
+        |guide, workspace| estimate::fundamental_guided(x1, x2, &options, guide, workspace),
         |found, inliers| {
             let chosen = found.fundamental().and_then(|f| pose(&f, inliers));
-            let errors = chosen.map(|chosen| pose_errors(&chosen.pose, truth));
+            // There is no covariance of F: the inliers alone tell.
+            let errors = chosen.map(|chosen| (pose_errors(&chosen.pose, truth), 1.0));
             (found.report, errors.ok_or_else(|| name(&found.verdict)))
         },
     )
@@ -187,15 +225,28 @@ fn homography<T: Real>(
     let size = file.size.unwrap_or_else(|| [reach(0), reach(1)]);
     judge(
         x1.len(),
-        |workspace| estimate::homography(x1, x2, &options, workspace),
+        settings,
+        |guide, workspace| estimate::homography_guided(x1, x2, &options, guide, workspace),
         |found, _| {
-            let errors = found.homography().map(|h| [transfer_error_px(truth, &matrix(&h.0), size); 2]);
+            let errors = match &found.verdict {
+                HomographyVerdict::Found(found) => {
+                    let error = transfer_error_px(truth, &matrix(&found.homography.0), size);
+                    Some(([error; 2], spread(found.covariance)))
+                }
+                _ => None,
+            };
             (found.report, errors.ok_or_else(|| name(&found.verdict)))
         },
     )
 }
 
 impl Settings {
+    /// "May I go on?" of a run that began at `start`.
+    pub(crate) fn keep_going(&self, start: Instant) -> impl FnMut(&Progress) -> bool {
+        let budget = self.time_budget;
+        move |_| budget.is_none_or(|budget| start.elapsed() < budget)
+    }
+
     pub(crate) fn apply<T: Real>(&self, options: &mut RansacOptions<T>) {
         options.seed = self.seed;
         if let Some(confidence) = self.confidence {

@@ -14,11 +14,22 @@ pub(crate) struct Outcome {
     pub(crate) inliers: u32,
     pub(crate) iterations: u32,
     pub(crate) milliseconds: f64,
+    /// How little the estimate itself trusts its answer: orders answers, largest last. Infinite without one.
+    pub(crate) doubt: f64,
     /// Why there is no estimate; empty where there is one.
     pub(crate) refusal: String,
 }
 
 impl Outcome {
+    /// How little the share of inliers trusts the answer: the measure others have.
+    pub(crate) fn outlier_share(&self) -> f64 {
+        if self.refusal.is_empty() {
+            1.0 - f64::from(self.inliers) / self.correspondences as f64
+        } else {
+            f64::INFINITY
+        }
+    }
+
     /// The larger of both errors.
     pub(crate) fn worst(&self) -> f64 {
         self.errors[0].max(self.errors[1])
@@ -92,6 +103,20 @@ pub(crate) fn share_above(values: &[f64], limit: f64) -> f64 {
     values.iter().filter(|v| **v > limit).count() as f64 / values.len().max(1) as f64
 }
 
+/// The share of errors above `limit`, in percent, among the `k` answers with the least doubt, for each `k`: points of
+/// coverage in percent and risk in percent.
+pub(crate) fn risk_coverage(doubts_and_errors: &[(f64, f64)], limit: f64) -> Vec<(f64, f64)> {
+    let mut sorted = doubts_and_errors.to_vec();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut wrong = 0;
+    let mut points = Vec::with_capacity(sorted.len());
+    for (k, (_, error)) in (1..).zip(&sorted) {
+        wrong += u32::from(*error > limit);
+        points.push((100.0 * f64::from(k) / sorted.len() as f64, 100.0 * f64::from(wrong) / f64::from(k)));
+    }
+    points
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -103,6 +128,12 @@ mod tests {
         // One error in the middle: a triangle up to it, then a plateau at 1.
         assert_eq!(auc_percent(&[5.0], 10.0), 100.0 * (2.5 + 5.0) / 10.0);
         assert!(auc_percent(&[1.0, 2.0, 30.0], 5.0) < auc_percent(&[1.0, 2.0, 3.0], 5.0));
+    }
+
+    #[test]
+    fn risk_grows_with_doubt_that_is_right() {
+        let curve = risk_coverage(&[(3.0, 9.0), (1.0, 0.1), (2.0, 0.2), (f64::INFINITY, REFUSED)], 5.0);
+        assert_eq!(curve, [(25.0, 0.0), (50.0, 0.0), (75.0, 100.0 / 3.0), (100.0, 50.0)]);
     }
 
     #[test]
