@@ -5,7 +5,7 @@ use epipole::bundle::{
     BundleError, BundleOptions, FrameHandle, PointHandle, PosePrior, Termination, Unknowns, Window,
     WindowError, WindowMemory, WindowStorage, prior_len, scalars_len, system_len,
 };
-use epipole::geometry::{Camera, KannalaBrandt, Pinhole, Pose};
+use epipole::geometry::{Camera, CameraModel, KannalaBrandt, Pinhole, Pose};
 use epipole::nalgebra::{Matrix6, UnitQuaternion, Vector2, Vector3};
 use epipole::real::lit;
 use epipole::robust::loss::Loss;
@@ -231,6 +231,66 @@ fn poses_alone_and_points_alone() {
     assert!(off(&window, 4) < 1e-5 && off(&window, 3) > 1e-3);
     let _ = window.optimise(&BundleOptions { unknowns: Unknowns::Frames, ..options }).unwrap();
     assert!(off(&window, 3) < 1e-5 && off(&window, 2) < 1e-5);
+}
+
+/// Points on all sides but straight behind: beyond 76 degrees off the axis the linearisation turns its axes.
+fn a_fisheye_sees_to_the_side<T: Real>(tolerance: f64, most_iterations: u32) {
+    let mut rng = Rng::new(31);
+    let lens = KannalaBrandt::new(Pinhole::new(190.0, 190.0, 255.0, 257.0).unwrap(), [0.01, 0.001, 0.0, 0.0]);
+    let exact: Camera<f64> = lens.unwrap().into();
+    let c = lit::<T>;
+    let pinhole = Pinhole::new(c(190.0), c(190.0), c(255.0), c(257.0)).unwrap();
+    let camera: Camera<T> =
+        KannalaBrandt::new(pinhole, [c(0.01), c(0.001), T::ZERO, T::ZERO]).unwrap().into();
+    let mut memory = HeapWindow::<T>::new(5, 60, 300);
+    let mut window = memory.window();
+    let (mut truth, mut frames) = (vec![], vec![]);
+    for k in 0..5 {
+        let rotation: UnitQuaternion<f64> = rng.rotation(0.2);
+        let centre = Vector3::new(0.4 * k as f64, 0.2 * rng.normal(), 0.2 * rng.normal());
+        truth.push(Pose::from_parts((-(rotation * centre)).into(), rotation));
+        let off = if k < 2 { 0.0 } else { 1.0 };
+        let turn: UnitQuaternion<f64> = rng.rotation(0.02 * off);
+        let shift = Vector3::new(rng.normal(), rng.normal(), rng.normal()) * 0.02 * off;
+        let start = Pose::from_parts((-(turn * rotation * (centre + shift))).into(), turn * rotation);
+        frames.push(window.add_frame(camera, &cast_pose(&start)).unwrap());
+        window.fix_frame(frames[k], k < 2).unwrap();
+    }
+    let mut sideways = 0;
+    while window.point_count() < 60 {
+        let x = Vector3::new(rng.normal(), rng.normal(), rng.normal()).normalize() * rng.range(2.0, 6.0);
+        let ys: Vec<_> = truth.iter().map(|p| p.rotation * x + p.translation.vector).collect();
+        if ys.iter().any(|y| y.z / y.norm() < -0.8) {
+            continue;
+        }
+        let noise = Vector3::new(rng.normal(), rng.normal(), rng.normal()) * 0.02;
+        let point = window.add_point(&(x + noise).map(lit)).unwrap();
+        for (frame, y) in frames.iter().zip(&ys) {
+            sideways += usize::from(y.z.abs() < 0.2 * y.norm());
+            let pixel = exact.project(y).unwrap();
+            window.add_observation(*frame, point, &pixel.map(lit), T::ONE).unwrap();
+        }
+    }
+    assert!(sideways > 30, "{sideways}");
+    let options = BundleOptions { loss: Loss::Squared, ..BundleOptions::default() };
+    let report = window.optimise(&options).unwrap();
+    assert_eq!((report.termination, report.behind), (Termination::Converged, 0));
+    // A wrong Jacobian needs more.
+    assert!(report.iterations <= most_iterations, "{} iterations", report.iterations);
+    for (frame, truth) in frames.iter().zip(&truth) {
+        let error = (centre(&cast_pose(&window.pose(*frame).unwrap())) - centre(truth)).norm();
+        assert!(error < tolerance, "{error}");
+    }
+}
+
+#[test]
+fn a_fisheye_sees_to_the_side_f64() {
+    a_fisheye_sees_to_the_side::<f64>(1e-6, 8);
+}
+
+#[test]
+fn a_fisheye_sees_to_the_side_f32() {
+    a_fisheye_sees_to_the_side::<f32>(1e-4, 12);
 }
 
 #[test]

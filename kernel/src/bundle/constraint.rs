@@ -3,7 +3,7 @@
 
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 
-use super::memory::{FrameSlot, NO_SLOT};
+use super::memory::{Chart, FrameSlot, NO_SLOT, Work};
 use super::placement::Placement;
 use super::small::{M3, dot, mul, mul_transposed, sub};
 use super::{WindowError, qr};
@@ -213,11 +213,7 @@ fn prior_rows<T: Real>(
         let here = *frame.at(at);
         let e = here.motion_from(&frame.linearised);
         let [turn, shift] = here.motion_jacobian(&frame.linearised, &e);
-        let [a, b, c, d, f, g] = e;
-        frame.work.e = [a, b, c];
-        frame.work.y = [d, f, g];
-        frame.work.u = turn;
-        frame.work.m = shift;
+        frame.work = Work::Chart(Chart { motion: e, turn, shift });
     }
     let n = 6 * prior_frames;
     for (k, packed) in qr::packed_rows(prior, n).enumerate() {
@@ -239,10 +235,11 @@ fn prior_rows<T: Real>(
                     *x = value;
                 }
             }
-            let w = &frame.work;
-            residual += r[0] * w.e[0] + r[1] * w.e[1] + r[2] * w.e[2];
-            residual += r[3] * w.y[0] + r[4] * w.y[1] + r[5] * w.y[2];
-            set_block(row, frame.slot, &through(&r, &w.u, &w.m));
+            let Work::Chart(chart) = &frame.work else { continue };
+            for (a, b) in r.iter().zip(&chart.motion) {
+                residual += *a * *b;
+            }
+            set_block(row, frame.slot, &through(&r, &chart.turn, &chart.shift));
         }
         sink(row, residual);
     }

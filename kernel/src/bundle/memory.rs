@@ -42,19 +42,42 @@ impl PointHandle {
 /// No column of the linear system: a fixed frame.
 pub(super) const NO_SLOT: u16 = u16::MAX;
 
-/// What a frame contributes to the point that is being eliminated, or to a constraint.
+/// What a frame contributes to the point that is being eliminated, or to the prior's rows.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Work<T> {
-    /// Column block of the frame, or `NO_SLOT` where the frame has no valid observation of the point.
-    pub(super) slot: u16,
-    /// `W`, the camera-frame by world block of the point, then `W L^-T`; of a constraint, the rotation Jacobian.
-    pub(super) u: M3<T>,
-    /// The point block in the camera frame; of a constraint, the translation Jacobian.
-    pub(super) m: M3<T>,
+pub(super) enum Work<T> {
+    /// No valid observation of the point, or a frame that does not move.
+    Nothing,
+    Seen(Seen<T>),
+    Chart(Chart<T>),
+}
+
+/// An observation of the point that is being eliminated, in the axes of its linearisation.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seen<T> {
     /// The point in the camera frame.
     pub(super) y: V3<T>,
-    /// The gradient by the point in the camera frame.
-    pub(super) e: V3<T>,
+    /// `-p`, `-q`: with the unit matrix the Jacobian of the plane point by the frame's translation.
+    pub(super) plane: [T; 2],
+    /// `P' W P`: elements 00, 01, 11.
+    pub(super) info: [T; 3],
+    /// `P' W r`
+    pub(super) g: [T; 2],
+    /// `P' W P D R`, then times `L^-T` with the factor of the point's block.
+    pub(super) n: [V3<T>; 2],
+    /// Jacobian of the plane point by the frame's rotation.
+    pub(super) rotation: [V3<T>; 2],
+    /// So many times was x taken for y, y for z and z for x: always 0 but for a fisheye that looks far to the side.
+    pub(super) turn: u8,
+    /// `P' W P` is diagonal, and nothing is turned.
+    pub(super) plain: bool,
+}
+
+/// How far a frame has moved from where the prior is linearised, and the Jacobian of that.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Chart<T> {
+    pub(super) motion: [T; 6],
+    pub(super) turn: M3<T>,
+    pub(super) shift: M3<T>,
 }
 
 /// A known distance to another frame.
@@ -93,13 +116,7 @@ impl<T: Real> FrameSlot<T> {
         linearised: Placement::IDENTITY,
         pose_prior: None,
         distance: None,
-        work: Work {
-            slot: NO_SLOT,
-            u: [[T::ZERO; 3]; 3],
-            m: [[T::ZERO; 3]; 3],
-            y: [T::ZERO; 3],
-            e: [T::ZERO; 3],
-        },
+        work: Work::Nothing,
         generation: 0,
         slot: NO_SLOT,
         prior_column: NO_SLOT,

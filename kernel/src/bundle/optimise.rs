@@ -4,13 +4,12 @@ use super::constraint::{self, At};
 use super::memory::{FrameHandle, FrameSlot, NO_SLOT, ObservationSlot, PointHandle, PointSlot};
 use super::options::{BundleOptions, BundleReport, PointReport, Progress, Termination, Unknowns};
 use super::pass::{self, Built, Points, Tried};
-use super::residual::residual;
+use super::residual::{Robust, squared_residual};
 use super::system::{System, block_index};
 use super::window::contradicts;
 use super::{BundleError, Window};
 use crate::Real;
 use crate::real::{from_u32, is_finite, lit, max, min, sqrt};
-use crate::robust::loss::Loss;
 
 /// Which frames may move.
 #[derive(Clone, Copy)]
@@ -51,13 +50,16 @@ impl<T: Real> Window<'_, T> {
     ///
     /// # Cost
     /// At most [`BundleOptions::max_iterations`] iterations, each two linearisations and one projection of every
-    /// observation, a 6x6 block for every pair of frames that see a point together, and a Cholesky factorisation.
+    /// observation. While the cost still falls by more than a fifth, an iteration also adds up a 6x6 block for every pair
+    /// of frames that see a point together and factors the system, half of all work; afterwards up to four of five
+    /// iterations keep the factor they have, with a new gradient, which loses next to nothing.
     ///
     /// # References
     /// B. Triggs, P. McLauchlan, R. Hartley, A. Fitzgibbon, "Bundle adjustment: a modern synthesis", Vision Algorithms,
     /// 2000 (the elimination; the second-order weight of a robust loss, section 4.3). H. B. Nielsen, "Damping parameter
-    /// in Marquardt's method", 1999 (the rule of the damping). Deviation: Marquardt's diagonal for the frames is that
-    /// of the reduced system.
+    /// in Marquardt's method", 1999 (the rule of the damping). J. Fan, "A Shamanskii-like Levenberg-Marquardt method for
+    /// nonlinear equations", Computational Optimization and Applications 56, 2013 (steps that keep a factor). Deviation:
+    /// Marquardt's diagonal for the frames is that of the reduced system.
     ///
     /// # Examples
     /// See the [module](super).
@@ -120,10 +122,9 @@ impl<T: Real> Window<'_, T> {
             let Some(frame) = self.frames.get(o.frame as usize) else { continue };
             let Some(camera) = &frame.camera else { continue };
             report.observations += 1;
-            match residual(camera, &frame.pose, position, o) {
+            match squared_residual(camera, &frame.pose, position, o) {
                 None => report.behind += 1,
-                Some(r) => {
-                    let squared = r[0] * r[0] + r[1] * r[1];
+                Some(squared) => {
                     sum += squared;
                     report.outliers += usize::from(!(squared <= outlier_sigma * outlier_sigma));
                 }
@@ -192,9 +193,9 @@ impl<T: Real> Window<'_, T> {
             observations,
             system,
             prior_frames: self.header.prior_frames,
-            loss: options.loss,
-            curved: false,
+            robust: Robust::new(options.loss),
             free: points,
+            points_promise: T::ZERO,
         };
         let mut damping = options.initial_damping;
         let (mut cost, built) = problem.linearise(damping);
@@ -217,10 +218,11 @@ impl<T: Real> Window<'_, T> {
             unused_points: built.unused_points,
             evaluations: observed,
         };
-        let least_damping = T::EPSILON * lit(8.0);
+        let least_damping = T::EPSILON;
         // Without noise every iteration halves what is left: no share of it would end the descent.
         let negligible = from_u32::<T>(observed) * lit(NEGLIGIBLE);
         let mut growth = T::TWO;
+        let mut age = 0;
         let mut current = true;
         report.termination = loop {
             if report.iterations >= options.max_iterations {
@@ -242,17 +244,24 @@ impl<T: Real> Window<'_, T> {
             }
             current = false;
             let tried = problem.try_step(damping);
-            if let Some(Tried { change, promised, lost_sight }) = tried {
+            if let Some((Tried { change, lost_sight }, promised)) = tried {
                 let small = options.cost_tolerance * max(cost, negligible);
                 let gain = -change / promised;
                 if !lost_sight && change < T::ZERO && gain > lit(1e-3) {
                     problem.accept();
                     report.changed = true;
                     cost += change;
-                    if -change <= small {
+                    // A lagged step that gains little says nothing of one that is not.
+                    if -change <= small && !problem.system.lagged {
                         break Termination::Converged;
                     }
-                    problem.curved = -change <= lit::<T>(CURVED) * cost;
+                    let curved = -change <= lit::<T>(CURVED) * cost;
+                    let settled = curved == problem.robust.curved
+                        && -change <= lit::<T>(LAGGED) * cost
+                        && -change > small;
+                    age = if settled && age < OLDEST { age + 1 } else { 0 };
+                    problem.system.lagged = age > 0;
+                    problem.robust.curved = curved;
                     let x = T::TWO * gain - T::ONE;
                     let shrink = max(T::ONE / lit(3.0), T::ONE - x * x * x);
                     damping = max(damping * shrink, least_damping);
@@ -260,11 +269,15 @@ impl<T: Real> Window<'_, T> {
                     continue;
                 }
                 // Where the promise itself is below the tolerance, rounding decides about the change.
-                if !(promised > small) {
+                if !(promised > small || problem.system.lagged) {
                     break Termination::Converged;
                 }
             }
-            problem.curved = false;
+            age = 0;
+            if core::mem::replace(&mut problem.system.lagged, false) {
+                continue;
+            }
+            problem.robust.curved = false;
             damping *= growth;
             growth *= T::TWO;
             if !(damping < lit(1e10)) {
@@ -287,14 +300,18 @@ impl<T: Real> Window<'_, T> {
                     return false;
                 };
                 let Some(camera) = &frame.camera else { return false };
-                residual(camera, &frame.pose, &point.position, o)
-                    .is_some_and(|r| !(r[0] * r[0] + r[1] * r[1] <= limit))
+                squared_residual(camera, &frame.pose, &point.position, o).is_some_and(|r| !(r <= limit))
             })
             .count()
     }
 }
 
+/// A fall by less than this share of the cost turns the curvature of the loss on.
 const CURVED: f64 = 1e-3;
+/// A fall by less than this share of the cost lets the next iteration keep the factored system.
+const LAGGED: f64 = 0.2;
+/// Iterations in a row that may keep it.
+const OLDEST: u32 = 4;
 /// The squared residual, in variances of its noise, that is as good as none: a thirtieth of a standard deviation.
 const NEGLIGIBLE: f64 = 1e-3;
 
@@ -305,10 +322,10 @@ struct Problem<'a, T: Real> {
     observations: &'a [ObservationSlot<T>],
     system: System<'a, T>,
     prior_frames: usize,
-    loss: Loss<T>,
-    /// The next steps take the curvature of the loss into account.
-    curved: bool,
+    robust: Robust<T>,
     free: Points,
+    /// Twice the fall of the cost that the points promise with the frames held.
+    points_promise: T,
 }
 
 impl<T: Real> Problem<'_, T> {
@@ -337,11 +354,11 @@ impl<T: Real> Problem<'_, T> {
             self.points,
             self.observations,
             &mut self.system,
-            &self.loss,
-            self.curved,
+            &self.robust,
             self.free,
             damping,
         );
+        self.points_promise = built.promised;
         (cost + built.rho, built)
     }
 
@@ -358,24 +375,21 @@ impl<T: Real> Problem<'_, T> {
         })
     }
 
-    /// The step of this damping, as trial placements and positions; none where the system is not positive definite.
-    fn try_step(&mut self, damping: T) -> Option<Tried<T>> {
+    /// The step of this damping, as trial placements and positions, and twice the fall of the cost that the damped
+    /// model promises; none where the system is not positive definite.
+    fn try_step(&mut self, damping: T) -> Option<(Tried<T>, T)> {
         if !self.system.damp_and_factor(damping) {
             return None;
         }
         self.system.solve();
         let system = &mut self.system;
-        let mut promised = T::ZERO;
+        let mut promised = self.points_promise;
         for frame in self.frames.iter_mut() {
             let slot = frame.slot as usize;
-            let (Some(d), Some(damping), Some(g)) =
-                (system.step.get(slot), system.damping.get(slot), system.gradient.get(slot))
-            else {
-                continue;
-            };
+            let (Some(d), Some(b)) = (system.step.get(slot), system.rhs.get(slot)) else { continue };
             frame.trial = frame.pose.moved(d);
             for k in 0..6 {
-                promised += d[k] * (damping[k] * d[k] - g[k]);
+                promised += d[k] * b[k];
             }
         }
         let mut tried = pass::back_substitute(
@@ -383,12 +397,10 @@ impl<T: Real> Problem<'_, T> {
             self.points,
             self.observations,
             system.step,
-            &self.loss,
-            self.curved,
+            &self.robust,
             self.free,
             damping,
         );
-        tried.promised += promised;
         let (prior, row) = (system.prior, system.step.as_flattened_mut());
         let mut change = T::ZERO;
         for (at, sign) in [(At::Trial, T::ONE), (At::Current, -T::ONE)] {
@@ -397,7 +409,7 @@ impl<T: Real> Problem<'_, T> {
             });
         }
         tried.change += change;
-        is_finite(tried.change).then_some(tried)
+        is_finite(tried.change).then_some((tried, promised))
     }
 
     /// Goes to where the last step led.

@@ -1,12 +1,11 @@
 //! The two passes over the observations that make one iteration: building the reduced system, and going back to the
 //! points with the frames' step. Jacobians are computed in both, and stored in neither.
 
-use super::memory::{FrameSlot, NO_SLOT, ObservationSlot, PointSlot};
-use super::residual::{linearise, residual};
-use super::small::{S3, V3, add, cross, dot, inverse_factor, lower, product_transposed, sub, upper};
-use super::system::{System, add_spread, add_spread_vector, block_index};
+use super::memory::{FrameSlot, NO_SLOT, ObservationSlot, PointSlot, Work};
+use super::residual::{Robust, linearise, squared_residual};
+use super::small::{S3, V3, add, add_scaled, dot, inverse_factor, lower, sub, upper};
+use super::system::{System, add_spread, add_square_spread, add_turned, block_index, subtract_spread_vector};
 use crate::Real;
-use crate::robust::loss::Loss;
 
 /// The observations, point by point.
 pub(super) struct Groups<'a, T: Real>(pub(super) &'a [ObservationSlot<T>]);
@@ -49,6 +48,8 @@ impl Points {
 pub(super) struct Built<T> {
     /// Twice the cost.
     pub(super) rho: T,
+    /// Twice the fall of the cost that the points alone promise, the frames held.
+    pub(super) promised: T,
     /// Observations that count.
     pub(super) used: usize,
     /// Observations behind their camera.
@@ -62,66 +63,93 @@ pub(super) struct Built<T> {
 pub(super) struct Tried<T> {
     /// Twice the change of the cost.
     pub(super) change: T,
-    /// Twice the fall of the cost that the linear model promises.
-    pub(super) promised: T,
     /// A point left the view of a camera that saw it.
     pub(super) lost_sight: bool,
 }
 
-fn damp<T: Real>(v: &S3<T>, lambda: T) -> S3<T> {
-    let up = T::ONE + lambda;
-    [v[0] * up, v[1], v[2], v[3] * up, v[4], v[5] * up]
+/// What the observations of a point say where it is.
+struct Observed<T> {
+    rho: T,
+    seen: usize,
+    behind: usize,
 }
 
-/// Fills the reduced system, but for the constraints and the damping of the frames.
+/// Linearises the observations of a point into the work space of their frames. Those that a free frame or a free point
+/// does not turn into an unknown are left out.
+#[inline(always)]
+fn observe<T: Real>(
+    frames: &mut [FrameSlot<T>],
+    group: &[ObservationSlot<T>],
+    x: &V3<T>,
+    robust: &Robust<T>,
+    is_free: bool,
+) -> Observed<T> {
+    let mut observed = Observed { rho: T::ZERO, seen: 0, behind: 0 };
+    for o in group {
+        let Some(frame) = frames.get_mut(o.frame as usize) else { continue };
+        frame.work = Work::Nothing;
+        let Some(camera) = &frame.camera else { continue };
+        if !is_free && frame.slot == NO_SLOT {
+            continue;
+        }
+        let Some(rho) = linearise(camera, &frame.pose, x, o, robust, &mut frame.work) else {
+            observed.behind += 1;
+            continue;
+        };
+        observed.rho += rho;
+        observed.seen += 1;
+    }
+    observed
+}
+
+/// The inverse Cholesky factor of a point's damped block.
+#[inline(always)]
+fn damped_factor<T: Real>(v: &S3<T>, lambda: T) -> Option<[T; 6]> {
+    let up = T::ONE + lambda;
+    inverse_factor(&[v[0] * up, v[1], v[2], v[3] * up, v[4], v[5] * up], T::EPSILON)
+}
+
+/// Fills the reduced system, but for the constraints and the damping of the frames. Until the step is known, the trial
+/// position of a free point holds `L^-1` times its gradient.
 pub(super) fn build<T: Real>(
     frames: &mut [FrameSlot<T>],
-    points: &[PointSlot<T>],
+    points: &mut [PointSlot<T>],
     observations: &[ObservationSlot<T>],
     system: &mut System<'_, T>,
-    loss: &Loss<T>,
-    curved: bool,
+    robust: &Robust<T>,
     free: Points,
     lambda: T,
 ) -> Built<T> {
-    let mut built = Built { rho: T::ZERO, used: 0, behind: 0, unused_points: 0 };
+    let mut built = Built { rho: T::ZERO, promised: T::ZERO, used: 0, behind: 0, unused_points: 0 };
     for (index, group) in Groups(observations) {
-        let Some(point) = points.get(index) else { continue };
+        let Some(point) = points.get_mut(index) else { continue };
         let is_free = free.is_free(index, point);
-        let (mut v, mut g) = ([T::ZERO; 6], [T::ZERO; 3]);
-        let mut rho = T::ZERO;
-        let mut seen = 0;
-        for o in group {
-            let Some(frame) = frames.get_mut(o.frame as usize) else { continue };
-            frame.work.slot = NO_SLOT;
-            let Some(camera) = &frame.camera else { continue };
-            if !is_free && frame.slot == NO_SLOT {
-                continue;
-            }
-            let Some(l) = linearise(camera, &frame.pose, &point.position, o, loss, curved) else {
-                built.behind += 1;
-                continue;
-            };
-            seen += 1;
-            rho += l.rho;
-            let wb = l.weighted_b();
-            l.add_point_block(&wb, &mut v);
-            let e = l.gradient();
-            g = add(&g, &super::small::mul_transposed(&frame.pose.rotation, &e));
-            if frame.slot != NO_SLOT {
-                let (u, m) = l.camera_blocks(&wb);
-                let work = &mut frame.work;
-                (work.slot, work.u, work.m, work.y, work.e) = (frame.slot, u, m, l.y, e);
-            }
-        }
-        if is_free && seen < 2 {
+        let observed = observe(frames, group, &point.position, robust, is_free);
+        built.behind += observed.behind;
+        point.trial = [T::ZERO; 3];
+        if is_free && observed.seen < 2 {
             built.unused_points += 1;
             continue;
         }
-        built.rho += rho;
-        built.used += seen;
-        let factor = if is_free { inverse_factor(&damp(&v, lambda), T::EPSILON) } else { None };
-        eliminate(frames, group, system, factor.as_ref().map(|l| (l, lower(l, &g))));
+        built.rho += observed.rho;
+        built.used += observed.seen;
+        let (mut v, mut g) = ([T::ZERO; 6], [T::ZERO; 3]);
+        for o in group {
+            let Some(frame) = frames.get_mut(o.frame as usize) else { continue };
+            let Work::Seen(seen) = &mut frame.work else { continue };
+            let mut n = [[T::ZERO; 3]; 2];
+            seen.add_to_point(&frame.pose.rotation, &mut v, |k, row, weighted| {
+                add_scaled(&mut g, &row, seen.g[k]);
+                n[k] = weighted;
+            });
+            seen.n = n;
+        }
+        let factor = if is_free { damped_factor(&v, lambda) } else { None };
+        if let Some(l) = &factor {
+            point.trial = lower(l, &g);
+            built.promised += dot(&point.trial, &point.trial);
+        }
+        eliminate(frames, group, system, factor.as_ref().map(|l| (l, &point.trial)));
     }
     built
 }
@@ -132,48 +160,61 @@ fn eliminate<T: Real>(
     frames: &mut [FrameSlot<T>],
     group: &[ObservationSlot<T>],
     system: &mut System<'_, T>,
-    point: Option<(&[T; 6], V3<T>)>,
+    point: Option<(&[T; 6], &V3<T>)>,
 ) {
+    // Fixed frames are often the oldest, which stand first.
+    let moves = |o: &ObservationSlot<T>| frames.get(o.frame as usize).is_some_and(|f| f.slot != NO_SLOT);
+    let Some((_, group)) = group.split_at_checked(group.iter().take_while(|o| !moves(o)).count()) else {
+        return;
+    };
     for (before, o) in group.iter().enumerate() {
         let Some(frame) = frames.get_mut(o.frame as usize) else { continue };
-        let work = &mut frame.work;
-        let slot = work.slot as usize;
-        if work.slot == NO_SLOT {
+        let slot = frame.slot as usize;
+        let Work::Seen(seen) = &mut frame.work else { continue };
+        if frame.slot == NO_SLOT {
             continue;
         }
-        let (Some(gradient), Some(rhs)) = (system.gradient.get_mut(slot), system.rhs.get_mut(slot)) else {
+        seen.rotation = seen.rotation_jacobian();
+        let [a, h, b] = seen.info;
+        let (mut k, mut g) = ([[a, h], [h, b]], seen.g);
+        if let Some((l, z)) = point {
+            seen.n = [lower(l, &seen.n[0]), lower(l, &seen.n[1])];
+            let n = &seen.n;
+            g = [g[0] - dot(&n[0], z), g[1] - dot(&n[1], z)];
+            let across = dot(&n[0], &n[1]);
+            k = [[a - dot(&n[0], &n[0]), h - across], [h - across, b - dot(&n[1], &n[1])]];
+        }
+        let frames = &*frames;
+        let Some(Work::Seen(seen)) = frames.get(o.frame as usize).map(|f| &f.work) else { continue };
+        let Some(rhs) = system.rhs.get_mut(slot) else { continue };
+        subtract_spread_vector(rhs, seen, g);
+        if system.lagged {
+            continue;
+        }
+        let Some(row) = system.blocks.get_mut(block_index(slot, 0)..=block_index(slot, slot)) else {
             continue;
         };
-        add_spread_vector(gradient, &work.y, &work.e);
-        let mut q = work.e;
-        let mut c = work.m;
-        if let Some((l, z)) = &point {
-            // N = U L^-T
-            let n = [lower(l, &work.u[0]), lower(l, &work.u[1]), lower(l, &work.u[2])];
-            work.u = n;
-            q = sub(&q, &[dot(&n[0], z), dot(&n[1], z), dot(&n[2], z)]);
-            for i in 0..3 {
-                for j in 0..3 {
-                    c[i][j] -= dot(&n[i], &n[j]);
-                }
-            }
-        }
-        add_spread_vector(rhs, &work.y, &[-q[0], -q[1], -q[2]]);
-        let (ya, na) = (work.y, work.u.map(|r| [-r[0], -r[1], -r[2]]));
-        if let Some(block) = system.blocks.get_mut(block_index(slot, slot)) {
-            add_spread(block, &ya, &c, &ya);
+        let Some((diagonal, row)) = row.split_last_mut() else { continue };
+        if seen.turn == 0 {
+            add_square_spread(diagonal, seen, &k);
+        } else {
+            add_turned(diagonal, seen, &k, seen);
         }
         if point.is_none() {
             continue;
         }
+        let n = seen.n.map(|r| r.map(|x| -x));
         for other in group.iter().take(before) {
             let Some(other) = frames.get(other.frame as usize) else { continue };
-            if other.work.slot == NO_SLOT {
+            let (Work::Seen(theirs), Some(block)) = (&other.work, row.get_mut(other.slot as usize)) else {
                 continue;
-            }
-            let c = product_transposed(&na, &other.work.u);
-            if let Some(block) = system.blocks.get_mut(block_index(slot, other.work.slot as usize)) {
-                add_spread(block, &ya, &c, &other.work.y);
+            };
+            let m = &theirs.n;
+            let k = [[dot(&n[0], &m[0]), dot(&n[0], &m[1])], [dot(&n[1], &m[0]), dot(&n[1], &m[1])]];
+            if seen.turn | theirs.turn == 0 {
+                add_spread(block, seen, &k, theirs);
+            } else {
+                add_turned(block, seen, &k, theirs);
             }
         }
     }
@@ -181,99 +222,66 @@ fn eliminate<T: Real>(
 
 /// Moves the points to their trial positions, given the frames' trial placements, and compares the costs.
 pub(super) fn back_substitute<T: Real>(
-    frames: &[FrameSlot<T>],
+    frames: &mut [FrameSlot<T>],
     points: &mut [PointSlot<T>],
     observations: &[ObservationSlot<T>],
     step: &[[T; 6]],
-    loss: &Loss<T>,
-    curved: bool,
+    robust: &Robust<T>,
     free: Points,
     lambda: T,
 ) -> Tried<T> {
-    let mut tried = Tried { change: T::ZERO, promised: T::ZERO, lost_sight: false };
+    let mut tried = Tried { change: T::ZERO, lost_sight: false };
     for (index, group) in Groups(observations) {
         let Some(point) = points.get_mut(index) else { continue };
-        point.trial = point.position;
         let is_free = free.is_free(index, point);
-        let (mut v, mut g, mut pull) = ([T::ZERO; 6], [T::ZERO; 3], [T::ZERO; 3]);
-        let mut before = T::ZERO;
-        let (mut seen, mut all_seen) = (0, true);
-        for o in group {
-            let Some(frame) = frames.get(o.frame as usize) else { continue };
-            let Some(camera) = &frame.camera else { continue };
-            if !is_free {
-                if frame.slot != NO_SLOT {
-                    match residual(camera, &frame.pose, &point.position, o) {
-                        Some(r) => before += loss.evaluate(r[0] * r[0] + r[1] * r[1]).0,
-                        None => all_seen = false,
-                    }
-                }
-                continue;
-            }
-            let Some(l) = linearise(camera, &frame.pose, &point.position, o, loss, curved) else {
-                all_seen = false;
-                continue;
-            };
-            seen += 1;
-            before += l.rho;
-            let wb = l.weighted_b();
-            l.add_point_block(&wb, &mut v);
-            let r = [l.weight * l.r[0], l.weight * l.r[1]];
-            for k in 0..3 {
-                g[k] += l.b[0][k] * r[0] + l.b[1][k] * r[1];
-            }
-            if let Some(s) = step.get(frame.slot as usize) {
-                let h = add(&cross(&[s[0], s[1], s[2]], &l.y), &[s[3], s[4], s[5]]);
-                let dh = [dot(&l.d[0], &h), dot(&l.d[1], &h)];
-                for k in 0..3 {
-                    pull[k] += wb[0][k] * dh[0] + wb[1][k] * dh[1];
-                }
-            }
-        }
-        if is_free && seen < 2 {
+        let z = core::mem::replace(&mut point.trial, point.position);
+        let observed = observe(frames, group, &point.position, robust, is_free);
+        if is_free && observed.seen < 2 {
             continue;
         }
-        if is_free && let Some(l) = inverse_factor(&damp(&v, lambda), T::EPSILON) {
-            let dx = upper(&l, &lower(&l, &add(&g, &pull))).map(|x| -x);
-            point.trial = add(&point.position, &dx);
-            let damped = [lambda * v[0] * dx[0], lambda * v[3] * dx[1], lambda * v[5] * dx[2]];
-            tried.promised += dot(&dx, &sub(&damped, &g));
+        if is_free {
+            let (mut v, mut pull) = ([T::ZERO; 6], [T::ZERO; 3]);
+            for o in group {
+                let Some(frame) = frames.get(o.frame as usize) else { continue };
+                let Work::Seen(seen) = &frame.work else { continue };
+                let moved = step.get(frame.slot as usize).map_or([T::ZERO; 2], |d| seen.moved_by(d));
+                seen.add_to_point(&frame.pose.rotation, &mut v, |k, _, weighted| {
+                    add_scaled(&mut pull, &weighted, moved[k]);
+                });
+            }
+            if let Some(l) = damped_factor(&v, lambda) {
+                let dx = upper(&l, &add(&z, &lower(&l, &pull)));
+                point.trial = sub(&point.position, &dx);
+            }
         }
-        let counts = |frame: &FrameSlot<T>| is_free || frame.slot != NO_SLOT;
-        let mut after = cost(frames, group, point, loss, counts, all_seen);
+        let mut after = cost(frames, group, &point.trial, robust);
         if after.is_none() {
             // One point that would leave the view does not spoil the step of all.
             point.trial = point.position;
-            after = cost(frames, group, point, loss, counts, all_seen);
+            after = cost(frames, group, &point.trial, robust);
         }
         match after {
-            Some(after) => tried.change += after - before,
+            Some(after) => tried.change += after - observed.rho,
             None => tried.lost_sight = true,
         }
     }
     tried
 }
 
-/// Twice the cost of a point at the trial state, of the observations that counted before; none where a camera that sees
+/// Twice the cost of a point with the trial placements, of the observations that count; none where a camera that sees
 /// it would no longer.
 #[inline(always)]
 fn cost<T: Real>(
     frames: &[FrameSlot<T>],
     group: &[ObservationSlot<T>],
-    point: &PointSlot<T>,
-    loss: &Loss<T>,
-    counts: impl Fn(&FrameSlot<T>) -> bool,
-    all_seen: bool,
+    x: &V3<T>,
+    robust: &Robust<T>,
 ) -> Option<T> {
     let mut sum = T::ZERO;
     for o in group {
         let Some(frame) = frames.get(o.frame as usize) else { continue };
-        let Some(camera) = &frame.camera else { continue };
-        if !counts(frame) || (!all_seen && residual(camera, &frame.pose, &point.position, o).is_none()) {
-            continue;
-        }
-        let r = residual(camera, &frame.trial, &point.trial, o)?;
-        sum += loss.evaluate(r[0] * r[0] + r[1] * r[1]).0;
+        let (Some(camera), Work::Seen(_)) = (&frame.camera, &frame.work) else { continue };
+        sum += robust.evaluate(squared_residual(camera, &frame.trial, x, o)?).0;
     }
     Some(sum)
 }

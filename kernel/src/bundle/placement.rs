@@ -62,7 +62,7 @@ impl<T: Real> Placement<T> {
 
     /// The point of the world in the camera frame.
     #[inline(always)]
-    pub(super) fn to_camera(self, x: &V3<T>) -> V3<T> {
+    pub(super) fn in_camera(&self, x: &V3<T>) -> V3<T> {
         mul(&self.rotation, &sub(x, &self.centre))
     }
 

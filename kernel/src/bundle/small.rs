@@ -29,6 +29,14 @@ pub(super) fn sub<T: Real>(a: &V3<T>, b: &V3<T>) -> V3<T> {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
+/// `a += b s`
+#[inline(always)]
+pub(super) fn add_scaled<T: Real>(a: &mut V3<T>, b: &V3<T>, s: T) {
+    for k in 0..3 {
+        a[k] += b[k] * s;
+    }
+}
+
 /// `M v`
 #[inline(always)]
 pub(super) fn mul<T: Real>(m: &M3<T>, v: &V3<T>) -> V3<T> {

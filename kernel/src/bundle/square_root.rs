@@ -3,8 +3,7 @@
 
 use super::memory::{FrameSlot, NO_SLOT, ObservationSlot, PointSlot, system_len};
 use super::qr::{insert, packed_len, rotate, row_scale};
-use super::residual::linearise;
-use super::small::cross;
+use super::residual::rows;
 use crate::Real;
 use crate::real::sqrt;
 use crate::robust::loss::Loss;
@@ -68,25 +67,23 @@ impl<'a, T: Real> SquareRoot<'a, T> {
             let enters = enters(o);
             let Some(frame) = frames.get(o.frame as usize) else { continue };
             let Some(camera) = &frame.camera else { continue };
-            let Some(l) = linearise(camera, &frame.pose, &point.position, o, loss, false) else { continue };
-            let weight = sqrt(l.weight);
-            for ((d, b), r) in l.d.iter().zip(&l.b).zip(l.r) {
-                let turn = cross(&l.y, d);
-                let j = [turn[0], turn[1], turn[2], d[0], d[1], d[2]].map(|x| x * weight);
+            let Some(l) = rows(camera, &frame.pose, &point.position, o, loss) else { continue };
+            for k in 0..2 {
                 self.row.fill(T::ZERO);
                 if let Some(last) = self.row.get_mut(self.n + 3) {
-                    *last = r * weight;
+                    *last = l.r[k];
                 }
                 let Some((own, others)) = self.row.split_at_mut_checked(3) else { return };
                 if !point.fixed {
-                    for (to, &from) in own.iter_mut().zip(b) {
-                        *to = from * weight;
+                    for (to, &from) in own.iter_mut().zip(&l.point[k]) {
+                        *to = from;
                     }
                 }
                 if let Some(block) = others.as_chunks_mut::<6>().0.get_mut(frame.slot as usize)
                     && frame.slot != NO_SLOT
                 {
-                    *block = j;
+                    let ([a, b, c], [d, e, f]) = (l.turn[k], l.shift[k]);
+                    *block = [a, b, c, d, e, f];
                 }
                 let jacobian = self.row.split_last().map_or(&[][..], |(_, j)| j);
                 self.fold_row(row_scale(jacobian), enters);

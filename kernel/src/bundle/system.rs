@@ -1,7 +1,6 @@
 //! The reduced linear system of the frames: a lower triangle of 6x6 blocks, its Cholesky factor and its solution.
 
-use super::memory::system_len;
-use super::small::{M3, V3, cross};
+use super::memory::{Seen, system_len};
 use crate::Real;
 use crate::real::sqrt;
 
@@ -14,14 +13,12 @@ pub(super) struct System<'a, T> {
     pub(super) blocks: &'a mut [Block<T>],
     /// Minus the reduced gradient.
     pub(super) rhs: &'a mut [[T; 6]],
-    /// The gradient before elimination.
-    pub(super) gradient: &'a mut [[T; 6]],
-    /// Diagonal of the damping.
-    pub(super) damping: &'a mut [[T; 6]],
     /// The step; a row of the constraints while there is no step.
     pub(super) step: &'a mut [[T; 6]],
     /// What lies behind: the marginalisation prior.
     pub(super) prior: &'a [T],
+    /// The blocks are the factor of an earlier iteration, and stay: only the right-hand side is filled.
+    pub(super) lagged: bool,
 }
 
 /// Where block `(a, b)`, `b <= a`, stands.
@@ -39,32 +36,31 @@ impl<'a, T: Real> System<'a, T> {
         let (blocks, _) = blocks.split_at_mut_checked(block_index(used, 0))?;
         let vectors = vectors.as_chunks_mut::<6>().0;
         let (rhs, vectors) = vectors.split_at_mut_checked(used)?;
-        let (gradient, vectors) = vectors.split_at_mut_checked(used)?;
-        let (damping, vectors) = vectors.split_at_mut_checked(used)?;
         let (step, _) = vectors.split_at_mut_checked(used)?;
-        Some(Self { blocks, rhs, gradient, damping, step, prior })
+        Some(Self { blocks, rhs, step, prior, lagged: false })
     }
 
     pub(super) fn clear(&mut self) {
-        self.blocks.fill([[T::ZERO; 6]; 6]);
+        if !self.lagged {
+            self.blocks.fill([[T::ZERO; 6]; 6]);
+        }
         self.rhs.fill([T::ZERO; 6]);
-        self.gradient.fill([T::ZERO; 6]);
     }
 
     /// Adds a row `J d + r` of a constraint.
     pub(super) fn add_row(&mut self, row: &[T], r: T) {
         let rows = row.as_chunks::<6>().0;
         let mut blocks = self.blocks.iter_mut();
-        for (a, (ja, (rhs, gradient))) in
-            rows.iter().zip(self.rhs.iter_mut().zip(self.gradient.iter_mut())).enumerate()
-        {
+        for (a, (ja, rhs)) in rows.iter().zip(self.rhs.iter_mut()).enumerate() {
             if ja.iter().all(|&x| x == T::ZERO) {
                 blocks.by_ref().take(a + 1).for_each(drop);
                 continue;
             }
             for k in 0..6 {
                 rhs[k] -= ja[k] * r;
-                gradient[k] += ja[k] * r;
+            }
+            if self.lagged {
+                continue;
             }
             for (jb, block) in rows.iter().zip(blocks.by_ref().take(a + 1)) {
                 for i in 0..6 {
@@ -78,15 +74,11 @@ impl<'a, T: Real> System<'a, T> {
 
     /// Adds `lambda` times the diagonal, and factors. False where the matrix is not positive definite.
     pub(super) fn damp_and_factor(&mut self, lambda: T) -> bool {
-        let Self { blocks, damping, .. } = self;
-        for (a, damping) in damping.iter_mut().enumerate() {
-            let Some(block) = blocks.get_mut(block_index(a, a)) else { return false };
-            for k in 0..6 {
-                damping[k] = lambda * block[k][k];
-                block[k][k] += damping[k];
-            }
+        if self.lagged {
+            return true;
         }
-        for a in 0..damping.len() {
+        let Self { blocks, rhs, .. } = self;
+        for a in 0..rhs.len() {
             let Some((above, row)) = blocks.split_at_mut_checked(block_index(a, 0)) else { return false };
             for b in 0..a {
                 // L_ab = (S_ab - sum L_ak L_bk') L_bb^-T
@@ -103,8 +95,11 @@ impl<'a, T: Real> System<'a, T> {
             }
             let Some((left, rest)) = row.split_at_mut_checked(a) else { return false };
             let Some(target) = rest.first_mut() else { return false };
+            for k in 0..6 {
+                target[k][k] += lambda * target[k][k];
+            }
             for p in left.iter() {
-                subtract_product(target, p, p);
+                subtract_square(target, p);
             }
             if !factor(target) {
                 return false;
@@ -163,6 +158,20 @@ fn subtract_product<T: Real>(t: &mut Block<T>, p: &Block<T>, q: &Block<T>) {
     }
 }
 
+/// `t -= p p'`, lower triangle.
+#[inline(always)]
+fn subtract_square<T: Real>(t: &mut Block<T>, p: &Block<T>) {
+    for i in 0..6 {
+        for j in 0..=i {
+            let mut sum = p[i][0] * p[j][0];
+            for k in 1..6 {
+                sum += p[i][k] * p[j][k];
+            }
+            t[i][j] -= sum;
+        }
+    }
+}
+
 /// Cholesky in place, lower triangle; the diagonal holds the inverses.
 #[inline(always)]
 fn factor<T: Real>(s: &mut Block<T>) -> bool {
@@ -214,35 +223,92 @@ fn backward<T: Real>(l: &Block<T>, b: &[T; 6]) -> [T; 6] {
     x
 }
 
-/// Adds `G_a C G_b'` to a block, with `G = [[y]x; I]`: what a camera-frame 3x3 block means for the motions of two
-/// frames that see the point at `ya` and `yb`.
+/// `K J_b` for a 2x2 matrix: rotation, then translation.
 #[inline(always)]
-pub(super) fn add_spread<T: Real>(block: &mut Block<T>, ya: &V3<T>, c: &M3<T>, yb: &V3<T>) {
-    // Columns of [ya]x C, by rows of the result.
-    let columns = [
-        cross(ya, &[c[0][0], c[1][0], c[2][0]]),
-        cross(ya, &[c[0][1], c[1][1], c[2][1]]),
-        cross(ya, &[c[0][2], c[1][2], c[2][2]]),
-    ];
-    for i in 0..3 {
-        let above = [columns[0][i], columns[1][i], columns[2][i]];
-        let turned = cross(yb, &above);
-        let low = cross(yb, &c[i]);
-        for j in 0..3 {
-            block[i][j] += turned[j];
-            block[i][j + 3] += above[j];
-            block[i + 3][j] += low[j];
-            block[i + 3][j + 3] += c[i][j];
+fn times_jacobian<T: Real>(k: &[[T; 2]; 2], b: &Seen<T>) -> [[T; 6]; 2] {
+    k.map(|[x, y]| {
+        let [r, s] = &b.rotation;
+        [x * r[0] + y * s[0], x * r[1] + y * s[1], x * r[2] + y * s[2], x, y, x * b.plane[0] + y * b.plane[1]]
+    })
+}
+
+/// Adds `J_a' K J_b` to a block: what a 2x2 matrix of the plane points means for the motions of two frames.
+#[inline(always)]
+pub(super) fn add_spread<T: Real>(block: &mut Block<T>, a: &Seen<T>, k: &[[T; 2]; 2], b: &Seen<T>) {
+    let [t, u] = times_jacobian(k, b);
+    let ([r, s], [p, q]) = (&a.rotation, a.plane);
+    for j in 0..6 {
+        for i in 0..3 {
+            block[i][j] += r[i] * t[j] + s[i] * u[j];
+        }
+        block[5][j] += p * t[j] + q * u[j];
+        block[3][j] += t[j];
+        block[4][j] += u[j];
+    }
+}
+
+/// The lower triangle of [`add_spread`] for one frame and a symmetric matrix.
+#[inline(always)]
+pub(super) fn add_square_spread<T: Real>(block: &mut Block<T>, a: &Seen<T>, k: &[[T; 2]; 2]) {
+    let [t, u] = times_jacobian(k, a);
+    let ([r, s], [p, q]) = (&a.rotation, a.plane);
+    for j in 0..6 {
+        for i in j..3 {
+            block[i][j] += r[i] * t[j] + s[i] * u[j];
+        }
+        block[5][j] += p * t[j] + q * u[j];
+        if j < 4 {
+            block[3][j] += t[j];
+        }
+        if j < 5 {
+            block[4][j] += u[j];
         }
     }
 }
 
-/// Adds `G g` to a vector.
-#[inline(always)]
-pub(super) fn add_spread_vector<T: Real>(to: &mut [T; 6], y: &V3<T>, g: &V3<T>) {
-    let turn = cross(y, g);
-    for k in 0..3 {
-        to[k] += turn[k];
-        to[k + 3] += g[k];
+/// [`add_spread`] for linearisations of which one or both have turned axes.
+#[inline(never)]
+pub(super) fn add_turned<T: Real>(block: &mut Block<T>, a: &Seen<T>, k: &[[T; 2]; 2], b: &Seen<T>) {
+    let mut spread = [[T::ZERO; 6]; 6];
+    add_spread(&mut spread, a, k, b);
+    for (i, row) in spread.iter().enumerate() {
+        let Some(to) = block.get_mut(turned(i, a.turn)) else { continue };
+        for (j, x) in row.iter().enumerate() {
+            if let Some(to) = to.get_mut(turned(j, b.turn)) {
+                *to += *x;
+            }
+        }
     }
+}
+
+/// Subtracts `J' g` from a vector.
+#[inline(always)]
+pub(super) fn subtract_spread_vector<T: Real>(to: &mut [T; 6], a: &Seen<T>, g: [T; 2]) {
+    let [r, s] = &a.rotation;
+    let spread = [
+        r[0] * g[0] + s[0] * g[1],
+        r[1] * g[0] + s[1] * g[1],
+        r[2] * g[0] + s[2] * g[1],
+        g[0],
+        g[1],
+        a.plane[0] * g[0] + a.plane[1] * g[1],
+    ];
+    if a.turn == 0 {
+        for k in 0..6 {
+            to[k] -= spread[k];
+        }
+        return;
+    }
+    for (k, x) in spread.iter().enumerate() {
+        if let Some(to) = to.get_mut(turned(k, a.turn)) {
+            *to -= *x;
+        }
+    }
+}
+
+/// The axis of the camera that axis `i` of a turned linearisation is.
+#[inline(always)]
+fn turned(i: usize, turn: u8) -> usize {
+    let axis = (i % 3 + turn as usize) % 3;
+    if i < 3 { axis } else { axis + 3 }
 }

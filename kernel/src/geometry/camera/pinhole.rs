@@ -42,24 +42,28 @@ impl<T: Real> Pinhole<T> {
     }
 
     /// Horizontal focal length, px.
+    #[inline]
     #[must_use]
     pub fn fx(&self) -> T {
         self.fx
     }
 
     /// Vertical focal length, px.
+    #[inline]
     #[must_use]
     pub fn fy(&self) -> T {
         self.fy
     }
 
     /// Principal point, px from the left.
+    #[inline]
     #[must_use]
     pub fn cx(&self) -> T {
         self.cx
     }
 
     /// Principal point, px from the top.
+    #[inline]
     #[must_use]
     pub fn cy(&self) -> T {
         self.cy
