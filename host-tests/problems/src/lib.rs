@@ -3,6 +3,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod golden;
 pub mod random;
 pub mod two_view;
 pub mod window;

@@ -82,20 +82,24 @@ impl<const N: usize> TwoView<N> {
                 }
             }
         }
-        if geometry == Geometry::Ransac {
-            scene.spoil(&mut SplitMix64(seed ^ 0xA5A5_A5A5));
-        }
-        scene
+        if geometry == Geometry::Ransac { scene.spoiled_by(seed) } else { scene }
     }
 
-    /// Noise on all points, then wrong matches in place of the first 30 of 100.
-    fn spoil(&mut self, random: &mut SplitMix64) {
+    /// The scene with noise on all points, and wrong matches in place of the first 30 of 100.
+    #[must_use]
+    pub fn spoiled(self) -> Self {
+        self.spoiled_by(0)
+    }
+
+    fn spoiled_by(mut self, seed: u64) -> Self {
+        let random = &mut SplitMix64(seed ^ 0xA5A5_A5A5);
         for x in self.x1.iter_mut().zip(&mut self.x2).flat_map(|(a, b)| [a, b]) {
             *x += Vector2::from(random.normal_pair()) / FOCAL;
         }
         for x in self.x2.iter_mut().take(N * 3 / 10) {
             *x = Vector2::new(random.between(-0.6, 0.6), random.between(-0.45, 0.45));
         }
+        self
     }
 
     /// Unit bearings of the first `M` points in both views.

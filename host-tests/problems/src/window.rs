@@ -16,6 +16,9 @@ pub const SIZE: [f64; 2] = [752.0, 480.0];
 /// Metres between frames.
 const STEP: f64 = 0.25;
 
+/// The handles of a filled window.
+pub type Handles<const F: usize, const P: usize> = ([Option<FrameHandle>; F], [Option<PointHandle>; P]);
+
 /// A flight whose points are known by their numbers: everything is computed when it is asked for.
 #[derive(Clone, Copy, Debug)]
 pub struct Flight {
@@ -89,7 +92,7 @@ impl Flight {
     pub fn fill<T: Real, const F: usize, const P: usize>(
         &self,
         window: &mut Window<'_, T>,
-    ) -> Result<([Option<FrameHandle>; F], [Option<PointHandle>; P]), WindowError> {
+    ) -> Result<Handles<F, P>, WindowError> {
         let mut frames = [None; F];
         let mut points = [None; P];
         let Some(camera) = self.camera() else { return Ok((frames, points)) };
