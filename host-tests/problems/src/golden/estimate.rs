@@ -8,6 +8,7 @@ use epipole::estimate::{
 use epipole::geometry::{Camera, CameraModel, Pinhole};
 use epipole::nalgebra::{Vector2, Vector3};
 use epipole::refine::{RefineAbsolutePoseOptions, absolute_pose as refine_absolute_pose};
+use epipole::robust::RansacOptions;
 use epipole::{Real, real::lit};
 use epipole_exercise::Sink;
 
@@ -16,6 +17,13 @@ use crate::two_view::FOCAL;
 use crate::{Geometry, TwoView};
 
 const N: usize = 60;
+
+/// So few samples that a core without an FPU ends in seconds.
+fn few_samples<T: Real>() -> RansacOptions<T> {
+    let mut options = RansacOptions::default();
+    options.budget.max_iterations = 60;
+    options
+}
 
 fn pinhole<T: Real>() -> Option<Camera<T>> {
     let focal = lit::<T>(FOCAL);
@@ -58,6 +66,7 @@ fn verdict<T: Real>(estimate: &RelativePoseEstimate<T>, sink: &mut Sink) {
 pub(super) fn relative_pose_of_views<T: Real>(sink: &mut Sink) {
     let mut options = RelativePoseOptions::default();
     options.max_error_px = T::TWO;
+    options.ransac = few_samples();
     for geometry in [Geometry::Ransac, Geometry::Upright, Geometry::Planar] {
         let scene = TwoView::new(geometry, 0);
         for camera in models::<T>().iter().flatten() {
@@ -88,11 +97,13 @@ pub(super) fn relative_pose_of_views<T: Real>(sink: &mut Sink) {
 }
 
 pub(super) fn homography_of_plane<T: Real>(sink: &mut Sink) {
+    let mut options = HomographyOptions::default();
+    options.ransac = few_samples();
     for k in 0..4 {
         let scene = TwoView::<N>::new(Geometry::Planar, k).spoiled();
         let [x1, x2] = scene.pixels::<T>();
         let mut storage = TwoViewStorage::<T, N>::new();
-        let found = homography(&x1, &x2, &HomographyOptions::default(), &mut storage.workspace());
+        let found = homography(&x1, &x2, &options, &mut storage.workspace());
         if let Ok(found) = found {
             sink.finite(found.homography().iter().flat_map(|h| &h.0));
             sink.finite(&[found.noise_px]);
@@ -102,11 +113,13 @@ pub(super) fn homography_of_plane<T: Real>(sink: &mut Sink) {
 }
 
 pub(super) fn fundamental_of_views<T: Real>(sink: &mut Sink) {
+    let mut options = FundamentalOptions::default();
+    options.ransac = few_samples();
     for k in 0..4 {
         let scene = TwoView::<N>::new(Geometry::Ransac, k);
         let [x1, x2] = scene.pixels::<T>();
         let mut storage = TwoViewStorage::<T, N>::new();
-        let found = fundamental(&x1, &x2, &FundamentalOptions::default(), &mut storage.workspace());
+        let found = fundamental(&x1, &x2, &options, &mut storage.workspace());
         if let Ok(found) = found {
             sink.finite(found.fundamental().iter().flat_map(|f| &f.0));
             sink.finite(&[found.noise_px]);
