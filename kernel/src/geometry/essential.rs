@@ -35,6 +35,20 @@ pub struct CheiralPose<T: Real> {
 
 impl<T: Real> Essential<T> {
     /// `E = [t]x R` of the pose of view 2 in the frame of view 1.
+    ///
+    /// # Returns
+    /// The matrix of norm `sqrt(2) |t|`; zero for a pure rotation, of which there is no essential matrix.
+    ///
+    /// # Examples
+    /// ```
+    /// use epipole::geometry::{Essential, Pose};
+    /// use epipole::nalgebra::Vector3;
+    /// let pose = Pose::new(Vector3::new(1.0_f64, 0.0, 0.2), Vector3::new(0.0, 0.3, 0.0));
+    /// let e = Essential::from_pose(&pose);
+    /// let x1 = Vector3::new(0.2, -0.1, 1.0) * 4.0;
+    /// let x2 = pose.rotation * x1 + pose.translation.vector;
+    /// assert!(x2.dot(&(e.0 * x1)).abs() < 1e-14);
+    /// ```
     #[must_use]
     pub fn from_pose(pose: &Pose<T>) -> Self {
         Self(skew(&pose.translation.vector) * pose.rotation.to_rotation_matrix().into_inner())
@@ -43,6 +57,16 @@ impl<T: Real> Essential<T> {
     /// `E = K2' F K1`, for calibration matrices that take normalised points to pixels.
     ///
     /// The product is essential only as far as F and the calibrations are exact; see [`Self::nearest`].
+    ///
+    /// # Examples
+    /// ```
+    /// use epipole::geometry::{Essential, Pinhole, Pose};
+    /// let k = Pinhole::new(500.0_f64, 500.0, 320.0, 240.0)?.matrix();
+    /// let e = Essential::from_pose(&Pose::translation(1.0, 0.0, 0.5));
+    /// let f = e.to_fundamental(&k, &k).unwrap();
+    /// assert!((Essential::from_fundamental(&f, &k, &k).0 - e.0).norm() < 1e-12);
+    /// # Ok::<(), epipole::geometry::CameraError>(())
+    /// ```
     #[must_use]
     pub fn from_fundamental(f: &Fundamental<T>, k1: &Matrix3<T>, k2: &Matrix3<T>) -> Self {
         Self(k2.transpose() * f.0 * k1)
@@ -72,6 +96,12 @@ impl<T: Real> Essential<T> {
     /// let e = Essential(Matrix3::from_diagonal(&Vector3::new(3.0_f64, 1.0, 0.1))).nearest().unwrap();
     /// assert!((e.0 - Matrix3::from_diagonal(&Vector3::new(2.0, 2.0, 0.0))).norm() < 1e-14);
     /// ```
+    ///
+    /// # Accuracy
+    /// A few `EPSILON` of the largest element.
+    ///
+    /// # Cost
+    /// About 700 instructions near an essential matrix; at most five squarings of a 3x3 matrix and its SVD far from one.
     #[must_use]
     pub fn nearest(&self) -> Option<Self> {
         let (u3, v3) = least_singular3(&self.0)?;

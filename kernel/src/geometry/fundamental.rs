@@ -25,12 +25,20 @@ pub struct Fundamental<T: Real>(pub Matrix3<T>);
 
 impl<T: Real> Fundamental<T> {
     /// The epipolar line `F x1` in view 2: homogeneous, `(a, b, c)` for `a u + b v + c = 0`.
+    ///
+    /// # Input
+    /// A homogeneous pixel (a bearing or normalised point, of an essential matrix), of any scale.
+    ///
+    /// # Examples
+    /// See [`Fundamental`].
     #[must_use]
     pub fn line2(&self, x1: &Vector3<T>) -> Vector3<T> {
         self.0 * x1
     }
 
     /// The epipolar line `F' x2` in view 1.
+    ///
+    /// Input and result as of [`Self::line2`].
     #[must_use]
     pub fn line1(&self, x2: &Vector3<T>) -> Vector3<T> {
         self.0.tr_mul(x2)
@@ -42,6 +50,13 @@ impl<T: Real> Fundamental<T> {
     /// # Returns
     /// `None` where F has a rank below 2 or is not finite. Of a matrix of rank 3, the point where the epipolar lines of
     /// two directions meet, which is the epipole as far as F is fundamental; see [`Self::nearest`].
+    ///
+    /// # Accuracy
+    /// A few `EPSILON` over the sine of the angle between the two columns of F that are least parallel: about 1e-4 rad in
+    /// `f32` for a matrix between pixels, `EPSILON` in normalised coordinates.
+    ///
+    /// # Cost
+    /// About 80 floating-point operations and seven square roots.
     #[must_use]
     pub fn epipole1(&self) -> Option<Vector3<T>> {
         null_of_columns(&self.0.transpose())
@@ -60,6 +75,21 @@ impl<T: Real> Fundamental<T> {
     ///
     /// # Returns
     /// `None` where the matrix is not finite or has no two singular values above `16 EPSILON` of the largest.
+    ///
+    /// # Accuracy
+    /// A few `EPSILON` of the largest element.
+    ///
+    /// # References
+    /// R. Hartley, "In defense of the eight-point algorithm", IEEE Transactions on Pattern Analysis and Machine
+    /// Intelligence 19, 1997 (section 2.2, the singularity constraint).
+    ///
+    /// # Examples
+    /// ```
+    /// use epipole::geometry::Fundamental;
+    /// use epipole::nalgebra::{Matrix3, Vector3};
+    /// let f = Fundamental(Matrix3::from_diagonal(&Vector3::new(3.0_f64, 1.0, 0.1))).nearest().unwrap();
+    /// assert!((f.0 - Matrix3::from_diagonal(&Vector3::new(3.0, 1.0, 0.0))).norm() < 1e-14);
+    /// ```
     #[must_use]
     pub fn nearest(&self) -> Option<Self> {
         let (u3, v3) = least_singular3(&self.0)?;

@@ -27,6 +27,16 @@ pub struct PlaneMotion<T: Real> {
 
 impl<T: Real> PlaneMotion<T> {
     /// `H = R + t n'`, between normalised points.
+    ///
+    /// # Examples
+    /// ```
+    /// use epipole::geometry::{PlaneMotion, Pose};
+    /// use epipole::nalgebra::Vector3;
+    /// // A step of a tenth of the distance towards a plane in front: its image grows.
+    /// let motion = PlaneMotion { pose: Pose::translation(0.0, 0.0, -0.1_f64), normal: Vector3::z() };
+    /// let x2 = motion.homography().0 * Vector3::new(0.2, 0.0, 1.0);
+    /// assert!((x2.x / x2.z - 0.2 / 0.9).abs() < 1e-15);
+    /// ```
     #[must_use]
     pub fn homography(&self) -> Homography<T> {
         let r = self.pose.rotation.to_rotation_matrix().into_inner();
@@ -37,6 +47,19 @@ impl<T: Real> PlaneMotion<T> {
 impl<T: Real> Homography<T> {
     /// The homography between pixels, `K2 H K1^-1`, of this one between normalised points. `None` where `K1` is
     /// singular.
+    ///
+    /// # Input
+    /// Calibration matrices that take normalised points to pixels; any scale of H.
+    ///
+    /// # Examples
+    /// ```
+    /// use epipole::geometry::{Homography, Pinhole};
+    /// use epipole::nalgebra::{Matrix3, Vector2};
+    /// let k = Pinhole::new(500.0_f64, 500.0, 320.0, 240.0)?.matrix();
+    /// let h = Homography(Matrix3::new(1.0, 0.0, 0.1, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)).to_pixels(&k, &k).unwrap();
+    /// assert_eq!(h.transfer(&Vector2::new(320.0, 240.0)).unwrap(), Vector2::new(370.0, 240.0));
+    /// # Ok::<(), epipole::geometry::CameraError>(())
+    /// ```
     #[must_use]
     pub fn to_pixels(&self, k1: &Matrix3<T>, k2: &Matrix3<T>) -> Option<Self> {
         Some(Self(k2 * self.0 * k1.try_inverse()?))
@@ -44,6 +67,8 @@ impl<T: Real> Homography<T> {
 
     /// The homography between normalised points, `K2^-1 H K1`, of this one between pixels. `None` where `K2` is
     /// singular.
+    ///
+    /// Input as of [`Self::to_pixels`], whose inverse it is.
     #[must_use]
     pub fn to_normalised(&self, k1: &Matrix3<T>, k2: &Matrix3<T>) -> Option<Self> {
         Some(Self(k2.try_inverse()? * self.0 * k1))
@@ -66,6 +91,15 @@ impl<T: Real> Homography<T> {
 
     /// The homography from view 2 to view 1. `None` where H is singular to within the rounding of its determinant, or
     /// determinant or inverse leave the range of `T`.
+    ///
+    /// # Examples
+    /// ```
+    /// use epipole::geometry::Homography;
+    /// use epipole::nalgebra::{Matrix3, Vector2};
+    /// let h = Homography(Matrix3::new(2.0_f64, 0.0, 1.0, 0.0, 2.0, 3.0, 0.0, 0.0, 1.0));
+    /// assert_eq!(h.inverse().unwrap().transfer(&Vector2::new(3.0, 5.0)), Some(Vector2::new(1.0, 1.0)));
+    /// assert!(Homography(Matrix3::<f64>::repeat(1.0)).inverse().is_none());
+    /// ```
     #[must_use]
     pub fn inverse(&self) -> Option<Self> {
         let [a, b, c] = self.0.data.0.map(Vector3::from);

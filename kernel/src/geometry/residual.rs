@@ -71,6 +71,16 @@ pub fn sampson_bearing<T: Real>(
 /// # References
 /// P. D. Sampson, "Fitting conic sections to 'very scattered' data", Computer Graphics and Image Processing 18, 1982;
 /// Q.-T. Luong, O. Faugeras, "The fundamental matrix", International Journal of Computer Vision 17, 1996.
+///
+/// # Examples
+/// ```
+/// use epipole::geometry::residual::sampson;
+/// use epipole::nalgebra::{Vector2, Vector3};
+/// // A camera that moves to the right: points stay in their row. Half of a row's error falls to either view.
+/// let e = Vector3::new(-1.0_f64, 0.0, 0.0).cross_matrix();
+/// let r = sampson(&e, &Vector2::new(0.1, 0.2), &Vector2::new(0.0, 0.202)).unwrap();
+/// assert!((r.abs() - 0.002 / 2f64.sqrt()).abs() < 1e-15);
+/// ```
 #[inline]
 #[must_use]
 pub fn sampson<T: Real>(m: &Matrix3<T>, x1: &Vector2<T>, x2: &Vector2<T>) -> Option<T> {
@@ -103,6 +113,9 @@ pub fn sampson_with_jacobian<T: Real>(
 /// ```
 ///
 /// Input as of [`sampson`]. None where the value is not finite: a point at its epipole.
+///
+/// # References
+/// Q.-T. Luong, O. Faugeras, "The fundamental matrix", International Journal of Computer Vision 17, 1996.
 #[inline]
 #[must_use]
 pub fn symmetric_epipolar_sq<T: Real>(m: &Matrix3<T>, x1: &Vector2<T>, x2: &Vector2<T>) -> Option<T> {

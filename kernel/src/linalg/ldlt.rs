@@ -71,6 +71,9 @@ impl<T: Real, const N: usize> Ldlt<T, N> {
     }
 
     /// `A^-1 B`, by substitution.
+    ///
+    /// # Cost
+    /// N^2 multiplications a column of B, no division.
     #[must_use]
     pub fn solve<const M: usize>(&self, b: &SMatrix<T, N, M>) -> SMatrix<T, N, M> {
         let mut result = *b;
@@ -94,6 +97,9 @@ impl<T: Real, const N: usize> Ldlt<T, N> {
     }
 
     /// `A^-1`, symmetric to the bit.
+    ///
+    /// # Cost
+    /// About N^3 / 2 multiplications.
     #[must_use]
     pub fn inverse(&self) -> SMatrix<T, N, N> {
         // Columns of L^-1, then A^-1 = L^-T D^-1 L^-1.

@@ -77,6 +77,9 @@ impl<T: Real, const N: usize> Lu<T, N> {
     }
 
     /// `A^-1 B`, by substitution.
+    ///
+    /// # Cost
+    /// N^2 multiplications and N divisions a column of B.
     #[must_use]
     pub fn solve<const M: usize>(&self, b: &SMatrix<T, N, M>) -> SMatrix<T, N, M> {
         let mut result = *b;
@@ -100,6 +103,9 @@ impl<T: Real, const N: usize> Lu<T, N> {
     }
 
     /// `A^-1`.
+    ///
+    /// # Cost
+    /// N^3 multiplications. To apply it once, [`Self::solve`] is cheaper and more accurate.
     #[must_use]
     pub fn inverse(&self) -> SMatrix<T, N, N> {
         self.solve(&super::identity())

@@ -48,6 +48,9 @@ impl<T: Real> Default for RansacOptions<T> {
 
 impl<T: Real> RansacOptions<T> {
     /// What is wrong with the options, if anything.
+    ///
+    /// # Errors
+    /// [`OptionsError::Confidence`] outside (0, 1), [`OptionsError::NoIterations`].
     pub fn check(&self) -> Result<(), OptionsError> {
         if !(self.confidence > T::ZERO && self.confidence < T::ONE) {
             return Err(OptionsError::Confidence);

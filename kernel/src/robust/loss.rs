@@ -35,6 +35,18 @@ impl<T: Real> Loss<T> {
     }
 
     /// `(cost, weight)` of a squared residual.
+    ///
+    /// The weight is the derivative of the cost by the squared residual: that of iteratively reweighted least squares.
+    ///
+    /// # Input
+    /// A squared residual, not negative, in the unit of `k` squared.
+    ///
+    /// # Examples
+    /// ```
+    /// use epipole::robust::loss::Loss;
+    /// assert_eq!(Loss::Huber(2.0_f64).evaluate(1.0), (1.0, 1.0));
+    /// assert_eq!(Loss::Huber(2.0_f64).evaluate(16.0), (2.0 * 2.0 * 4.0 - 4.0, 0.5));
+    /// ```
     #[inline]
     #[must_use]
     pub fn evaluate(&self, squared: T) -> (T, T) {

@@ -4,6 +4,14 @@ use crate::Real;
 
 /// Fills `order` with 0, 1, ... sorted by rising score; equal scores keep the order of their indices, NaN goes last.
 /// As many entries are used as both slices have. Heap sort: no allocation, at most about 2 n log2 n steps.
+///
+/// # Examples
+/// ```
+/// use epipole::robust::rank_by_score;
+/// let mut order = [0; 4];
+/// rank_by_score(&[0.7_f32, f32::NAN, 0.2, 0.7], &mut order);
+/// assert_eq!(order, [2, 0, 3, 1]);
+/// ```
 pub fn rank_by_score<T: Real>(scores: &[T], order: &mut [u32]) {
     let n = core::cmp::min(scores.len(), order.len());
     let Some(order) = order.get_mut(..n) else { return };

@@ -19,6 +19,7 @@ const NEAR_MISS_INTERVAL: u32 = 32;
 
 /// What a run found: models after local optimisation, best first, and how it went.
 #[derive(Clone, Copy, Debug)]
+#[must_use]
 pub struct Consensus<M, T> {
     /// The best model and the runners-up of other samples (often the same optimum again).
     pub models: [Option<(M, Score<T>)>; KEPT],
@@ -28,16 +29,72 @@ pub struct Consensus<M, T> {
 
 /// The consensus of an estimator's correspondences.
 ///
-/// `order` maps the ranks of ranked sampling to correspondences; without it samples are uniform. `least_inliers` is
-/// the smallest consensus of interest: it sharpens the sequential test while nothing has been found. `keep_going` is
-/// asked before every [`Guide::INTERVAL`]-th iteration.
-///
 /// The best hypothesis of a sample is optimised locally where it comes near the best minimal model so far; the run
 /// ends once samples enough for the inliers of the best optimised model have been drawn.
 ///
+/// # Input
+/// `order` maps the ranks of ranked sampling to correspondences; without it samples are uniform. `least_inliers` is
+/// the smallest consensus of interest: it sharpens the sequential test while nothing has been found. `keep_going` is
+/// asked before every [`Guide::INTERVAL`]-th iteration. Options are taken as they are: [`RansacOptions::check`] them.
+///
+/// # Returns
+/// Up to [`KEPT`] models, best first, and the report. No model where every sample was degenerate, every hypothesis was
+/// rejected, or there are fewer correspondences than a sample takes.
+///
+/// # Cost
+/// At most the budget, of which the residuals may be exceeded by the hypotheses of one sample and one refinement.
+/// Memory: the models alone, on the stack.
+///
 /// # References
-/// M. Fischler, R. Bolles, "Random sample consensus", Communications of the ACM, 1981.
-/// O. Chum, J. Matas, J. Kittler, "Locally optimized RANSAC", DAGM 2003.
+/// M. Fischler, R. Bolles, "Random sample consensus", Communications of the ACM 24, 1981.
+/// O. Chum, J. Matas, J. Kittler, "Locally optimized RANSAC", DAGM 2003. Here a hypothesis is optimised where it comes
+/// near the best minimal model, not only where it beats it.
+///
+/// # Examples
+/// A line through points, some of them wrong:
+/// ```
+/// use epipole::robust::{Estimator, Gate, RansacOptions, Score, ScoreCounts, ransac};
+///
+/// struct Points<'a>(&'a [(f32, f32)]);
+///
+/// impl Estimator<f32, 2> for Points<'_> {
+///     type Model = (f32, f32); // y = a + b x
+///
+///     fn count(&self) -> u32 {
+///         self.0.len() as u32
+///     }
+///
+///     fn generate(&self, sample: &[u32; 2], found: &mut impl FnMut(&(f32, f32))) -> bool {
+///         let [p, q] = sample.map(|i| self.0[i as usize]);
+///         let b = (q.1 - p.1) / (q.0 - p.0);
+///         found(&(p.1 - b * p.0, b));
+///         true
+///     }
+///
+///     fn score(&self, model: &(f32, f32), gate: &Gate<f32>, counts: &mut ScoreCounts) -> Option<Score<f32>> {
+///         counts.residuals += self.0.len() as u64;
+///         let mut score = Score { cost: 0.0, inliers: 0 };
+///         for (x, y) in self.0 {
+///             let squared = ((model.0 + model.1 * x - y) / 0.1).powi(2);
+///             score.cost += squared.min(1.0);
+///             score.inliers += u32::from(squared < 1.0);
+///         }
+///         (score.cost <= gate.bound).then_some(score)
+///     }
+///
+///     fn refine(&self, _: &(f32, f32), _: &mut u64) -> Option<(f32, f32)> {
+///         None
+///     }
+/// }
+///
+/// let points: [(f32, f32); 12] = core::array::from_fn(|i| {
+///     let x = i as f32;
+///     (x, if i % 3 == 0 { 7.0 - x * x } else { 1.0 + 0.5 * x })
+/// });
+/// let consensus = ransac(&Points(&points), &RansacOptions::default(), None, 2, None);
+/// let ((a, b), score) = consensus.models[0].unwrap();
+/// assert!((a - 1.0).abs() < 1e-5 && (b - 0.5).abs() < 1e-5 && score.inliers == 8);
+/// ```
 pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
     estimator: &E,
     options: &RansacOptions<T>,

@@ -66,6 +66,7 @@ impl<T: Real> Gate<T> {
 
     /// True where a hypothesis with this tally has lost.
     #[inline(always)]
+    #[must_use]
     pub fn rejects(&self, cost: T, inliers: T, seen: T) -> bool {
         cost > self.bound || inliers * self.per_inlier + (seen - inliers) * self.per_outlier > self.limit
     }

@@ -49,6 +49,28 @@ impl<T: Real> ViewPair<T> {
     ///
     /// Bearings and Jacobians as [`unproject_with_jacobian`](crate::geometry::CameraModel::unproject_with_jacobian)
     /// gives them; on the planes z = 1 with the Jacobian `[1 0; 0 1; 0 0]` nothing is approximated.
+    ///
+    /// # Returns
+    /// As [`ViewPair::triangulate_optimal`].
+    ///
+    /// # Cost
+    /// About 300 operations, two iterations, no loop.
+    ///
+    /// # Examples
+    /// ```
+    /// use epipole::geometry::triangulation::ViewPair;
+    /// use epipole::geometry::{CameraModel, KannalaBrandt, Pinhole, Pose};
+    /// use epipole::nalgebra::Vector3;
+    /// let pinhole = Pinhole::new(300.0_f64, 300.0, 320.0, 240.0)?;
+    /// let fisheye = KannalaBrandt::new(pinhole, [3e-3, 7e-4, -2e-3, 2e-4])?;
+    /// let pose = Pose::translation(-1.0, 0.0, 0.0);
+    /// let point = Vector3::new(3.0, 0.5, 2.0);
+    /// let [(x1, j1), (x2, j2)] = [point, point + pose.translation.vector]
+    ///     .map(|x| fisheye.unproject_with_jacobian(&fisheye.project(&x).unwrap()).unwrap());
+    /// let found = ViewPair::new(&pose).triangulate_optimal_bearings(&x1, &x2, &j1, &j2).point().unwrap();
+    /// assert!((found - point).norm() < 1e-9);
+    /// # Ok::<(), epipole::geometry::CameraError>(())
+    /// ```
     #[inline]
     pub fn triangulate_optimal_bearings(
         &self,
