@@ -335,6 +335,8 @@ fn of_a_hundred_thousand_frames_none_is_lost() {
     let (world, mut memory) = (World::default(), Box::new(Room::new()));
     let mut server = world.server(&mut memory);
     let mut random = SplitMix64(3);
+    // Damaged options may ask for any number of iterations: the limit ends them.
+    world.step_us.set(300_000);
     let (mut whole_frames, mut accepted, mut replies, mut estimates) = (0u32, 0u32, 0u32, 0u32);
     // Requests with few iterations: it is the frames that are tested here.
     let requests: Vec<_> = (0..50).map(|k| whole(&synthetic(k, 0, 12, 1))).collect();
@@ -357,9 +359,10 @@ fn of_a_hundred_thousand_frames_none_is_lost() {
             // Whole frames with any content, too.
             if below(&mut random, 10) == 0 && !body.is_empty() {
                 let at = below(&mut random, body.len());
-                match random.bits() & 1 {
+                match random.bits() & 3 {
                     0 => body[at] = random.bits() as u8,
-                    _ => body.truncate(at),
+                    1 => body.truncate(at),
+                    _ => body.iter_mut().skip(at).take(8).for_each(|byte| *byte = 0xff),
                 }
             }
             let damage = Damage::any(&mut random);
