@@ -95,3 +95,119 @@ pub enum StopReason {
     /// A reason that this version of the header does not name.
     Other = 5,
 }
+
+/// How much a residual r counts; the scale k is `loss_scale`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Loss {
+    /// r^2; the scale is ignored.
+    Squared = 0,
+    /// min(r^2, k^2).
+    Truncated = 1,
+    /// r^2 up to k, linear beyond.
+    Huber = 2,
+    /// k^2 ln(1 + r^2 / k^2).
+    Cauchy = 3,
+    /// Tukey's biweight, constant beyond k.
+    Tukey = 4,
+    /// r^2 / (1 + r^2 / k^2).
+    GemanMcClure = 5,
+}
+
+/// What correspondences say about a homography.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum HomographyVerdict {
+    /// A homography and its uncertainty.
+    Found = 0,
+    /// The inliers agree, and many homographies explain them: see `unobservable`.
+    Unobservable = 1,
+    /// Something agrees, on no more correspondences than chance explains.
+    TooFewInliers = 2,
+    /// No homography explains more correspondences than chance.
+    NoConsensus = 3,
+    /// A verdict that this version of the header does not name.
+    Other = 4,
+}
+
+/// What correspondences say about the epipolar geometry of two images.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum FundamentalVerdict {
+    /// A fundamental matrix.
+    Found = 0,
+    /// All inliers agree with one homography, which is the matrix of the answer.
+    Planar = 1,
+    /// The inliers agree, and no epipolar geometry follows: see `unobservable`.
+    Unobservable = 2,
+    /// So few correspondences that chance could explain them.
+    TooFewInliers = 3,
+    /// No epipolar geometry explains more correspondences than chance.
+    NoConsensus = 4,
+    /// A verdict that this version of the header does not name.
+    Other = 5,
+}
+
+/// What pixels of known points say about the camera's pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum AbsolutePoseVerdict {
+    /// One pose.
+    Pose = 0,
+    /// Two poses of a plane that fit alike, the more likely first.
+    PlanarAmbiguity = 1,
+    /// The inliers agree, and no pose follows: see `unobservable`.
+    Unobservable = 2,
+    /// The points agree only behind the camera: an axis of a frame is reversed.
+    BehindCamera = 3,
+    /// Something agrees, on no more correspondences than chance explains.
+    TooFewInliers = 4,
+    /// No pose explains more correspondences than chance.
+    NoConsensus = 5,
+    /// A verdict that this version of the header does not name.
+    Other = 6,
+}
+
+/// What became of a gravity prior.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum GravityFit {
+    /// None was given, or no pose found.
+    None = 0,
+    /// It took part in the refinement.
+    Fits = 1,
+    /// The correspondences contradict it, and it was left aside.
+    Contradicted = 2,
+    /// Something that this version of the header does not name.
+    Other = 3,
+}
+
+/// Which unknowns of a window move. Fixed frames and fixed points never do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Unknowns {
+    /// Frames and points.
+    FramesAndPoints = 0,
+    /// Frames alone.
+    Frames = 1,
+    /// Points alone.
+    Points = 2,
+}
+
+/// Why the optimisation of a window ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Termination {
+    /// The cost falls no further than the tolerance.
+    Converged = 0,
+    /// `max_iterations` are done.
+    IterationLimit = 1,
+    /// The next iteration would exceed `max_evaluations`.
+    BudgetSpent = 2,
+    /// The caller answered no.
+    Interrupted = 3,
+    /// No step lowers the cost, however strongly damped.
+    NoProgress = 4,
+    /// A reason that this version of the header does not name.
+    Other = 5,
+}

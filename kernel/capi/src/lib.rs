@@ -8,8 +8,8 @@
 //! | file | holds |
 //! |---|---|
 //! | `raw.rs` | pointers into slices and values: every check that can be made of a pointer, and all of the `unsafe` but the calls to it |
-//! | `status.rs`, `enums.rs`, `types.rs` | what C sees: codes, enumerations, structs, and their conversions |
-//! | `workspace.rs` | the caller's memory cut into the slices of an estimator |
+//! | `status.rs`, `enums.rs`, `types.rs`, `options.rs`, `estimates.rs`, `limits.rs` | what C sees: codes, enumerations, structs with their conversions, capacities |
+//! | `workspace.rs`, `window.rs` | the caller's memory cut into the slices of an estimator, of a window |
 //! | `api/` | the functions, written for one scalar and compiled for `f32` and `f64` |
 //!
 //! # Safety
@@ -22,9 +22,14 @@
 extern crate std;
 
 pub mod enums;
+pub mod estimates;
+pub mod limits;
+pub mod options;
 mod raw;
 pub mod status;
 pub mod types;
+#[cfg(feature = "bundle")]
+pub mod window;
 mod workspace;
 
 pub use status::{ABI_VERSION, Status, abi_version, status_string};
@@ -45,7 +50,12 @@ pub mod f32 {
     pub(crate) type Scalar = f32;
     pub mod camera;
     pub mod estimate;
+    pub mod geometry;
+    pub mod residual;
+    pub mod solvers;
     pub mod triangulation;
+    #[cfg(feature = "bundle")]
+    pub mod window;
 }
 
 /// The functions that end in `_f64`.
@@ -60,7 +70,12 @@ pub mod f64 {
     pub(crate) type Scalar = f64;
     pub mod camera;
     pub mod estimate;
+    pub mod geometry;
+    pub mod residual;
+    pub mod solvers;
     pub mod triangulation;
+    #[cfg(feature = "bundle")]
+    pub mod window;
 }
 
 #[cfg(all(target_os = "none", feature = "panic-handler"))]

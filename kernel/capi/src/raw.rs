@@ -23,6 +23,8 @@ unsafe impl Plain for f64 {}
 unsafe impl Plain for u8 {}
 // SAFETY: numbers.
 unsafe impl Plain for u32 {}
+// SAFETY: an address; it is written, never read.
+unsafe impl<T> Plain for *mut T {}
 // SAFETY: an array has no bits but those of its elements.
 unsafe impl<T: Plain, const N: usize> Plain for [T; N] {}
 // SAFETY: `repr(C)` over a transparent array of N numbers.
@@ -85,6 +87,11 @@ impl<'a, V: Plain> Input<'a, V> {
         range.start.addr()..range.end.addr()
     }
 
+    /// The array of its elements.
+    pub(crate) fn array<const N: usize>(&self) -> Result<&'a [V; N], Status> {
+        self.slice.try_into().map_err(|_| Status::TooFew)
+    }
+
     /// The first element.
     pub(crate) fn value(&self) -> Result<V, Status> {
         self.slice.first().copied().ok_or(Status::TooFew)
@@ -115,6 +122,11 @@ impl<V: Plain> Output<'_, V> {
         self.bytes.clone()
     }
 
+    /// An error where fewer than `most` elements would fit.
+    pub(crate) fn holding(&self, most: usize) -> Result<(), Status> {
+        if self.capacity < most { Err(Status::Capacity) } else { Ok(()) }
+    }
+
     /// Writes the next element; nothing beyond the last.
     pub(crate) fn push(&mut self, value: V) {
         if self.written < self.capacity {
@@ -128,6 +140,24 @@ impl<V: Plain> Output<'_, V> {
     pub(crate) fn write(&mut self, values: impl IntoIterator<Item = V>) -> usize {
         values.into_iter().for_each(|value| self.push(value));
         self.written
+    }
+}
+
+impl<V: Plain> Output<'_, V> {
+    /// Writes what there is, `none` where there is nothing, and which it was; tells how many there are.
+    pub(crate) fn write_masked(
+        &mut self,
+        mask: &mut Output<'_, u8>,
+        values: impl IntoIterator<Item = Option<V>>,
+        none: V,
+    ) -> usize {
+        let mut found = 0;
+        for value in values {
+            found += usize::from(value.is_some());
+            mask.push(u8::from(value.is_some()));
+            self.push(value.unwrap_or(none));
+        }
+        found
     }
 }
 
@@ -199,3 +229,17 @@ pub(crate) fn disjoint(inputs: &[Bytes], outputs: &[Bytes]) -> Result<(), Status
     }
     Ok(())
 }
+
+/// Arguments of a function as inputs and outputs of the same names, after the checks of their pointers.
+macro_rules! lend {
+    (in { $($input:ident: [$read:ty; $count:expr]),* $(,)? } out { $($output:ident: [$write:ty; $capacity:expr]),* $(,)? }) => {
+        // SAFETY: the caller's promise, which every function of `api` documents.
+        #[allow(unused_unsafe, clippy::unused_unit)]
+        let ($($input,)*) = unsafe { ($($crate::raw::Input::<$read>::new($input, $count)?,)*) };
+        // SAFETY: the same.
+        #[allow(unused_unsafe, clippy::unused_unit)]
+        let ($(mut $output,)*) = unsafe { ($($crate::raw::Output::<$write>::new($output, $capacity)?,)*) };
+        $crate::raw::disjoint(&[$($input.bytes()),*], &[$($output.bytes()),*])?;
+    };
+}
+pub(crate) use lend;

@@ -5,6 +5,7 @@ use core::ffi::{CStr, c_char};
 use epipole::InputError;
 use epipole::estimate::{AbsolutePoseError, TwoViewError};
 use epipole::geometry::CameraError;
+use epipole::geometry::triangulation::RefinePointError;
 use epipole::robust::OptionsError;
 
 /// Grows with every change of the ABI that an older program would notice.
@@ -253,5 +254,16 @@ impl From<AbsolutePoseError> for Status {
 impl From<CameraError> for Status {
     fn from(_: CameraError) -> Self {
         Self::Camera
+    }
+}
+
+impl From<RefinePointError> for Status {
+    fn from(error: RefinePointError) -> Self {
+        match error {
+            RefinePointError::Input(error) => error.into(),
+            RefinePointError::NotVisible { .. } => Self::NotVisible,
+            RefinePointError::Unobservable => Self::Unobservable,
+            _ => Self::Other,
+        }
     }
 }

@@ -1,15 +1,15 @@
 //! Structs as C sees them: no pointers and no `size_t`, so 32- and 64-bit machines agree on their layout.
 
 use epipole::Real;
-use epipole::estimate;
+use epipole::geometry::triangulation::{self, Triangulation};
 use epipole::geometry::{self, BrownConrady, KannalaBrandt, Pinhole};
-use epipole::nalgebra::{Quaternion, SMatrix, Translation3, UnitQuaternion};
+use epipole::nalgebra::{Quaternion, SMatrix, Translation3, UnitQuaternion, Vector3};
 use epipole::real::{abs, is_finite, lit};
 use epipole::robust::{self, RansacReport};
 
 use crate::Status;
 use crate::enums::{self, CameraModel};
-use crate::raw::{Grows, Plain};
+use crate::raw::Plain;
 
 /// A pose into the camera, `x_cam = R X + t`; of two views, `X2 = R X1 + t`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -44,29 +44,42 @@ unsafe impl<T: Plain> Plain for Pose<T> {}
 // SAFETY: plain numbers, and padding that nobody reads.
 unsafe impl<T: Plain> Plain for Camera<T> {}
 
-/// Options of `epi_relative_pose`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// What the rays of views determine.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
-pub struct RelativePoseOptions<T> {
-    /// Of this struct, in bytes.
-    pub size: u32,
-    /// Samples drawn at the least.
-    pub min_iterations: u32,
-    /// Samples drawn at the most.
-    pub max_iterations: u32,
-    /// Minimal problems solved at the most.
-    pub max_solver_calls: u32,
-    /// Residuals evaluated at the most.
-    pub max_residuals: u64,
-    /// The same seed and input give the same bits.
-    pub seed: u64,
-    /// Probability, in (0, 1), that a sample of inliers only has been drawn when the search stops by itself.
-    pub confidence: T,
-    /// Largest Sampson error of an inlier, pixels.
-    pub max_error_px: T,
-    /// Standard deviation of the noise of one image coordinate, pixels; 0 for half of `max_error_px`.
-    pub sigma_px: T,
+pub struct TriangulatedPoint<T> {
+    /// By the verdict a point, a unit direction, or zeros.
+    pub point: [T; 3],
+    /// One of `epi_triangulation_verdict`.
+    pub verdict: u32,
+    /// The first view that the point lies behind.
+    pub view: u32,
+    /// How many views it lies behind.
+    pub behind: u32,
 }
+
+/// A point of least reprojection error.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
+pub struct RefinedPoint<T> {
+    /// In the world.
+    pub point: [T; 3],
+    /// Sum of the squared reprojection errors.
+    pub cost_px_sq: T,
+    /// Of the point for a noise of 1 px, 3x3 by rows; zeros without.
+    pub covariance_per_px_sq: [[T; 3]; 3],
+    /// 1 where there is a covariance, 0 where a direction is open.
+    pub has_covariance: u32,
+    /// 1 where the iteration converged.
+    pub converged: u32,
+    /// Evaluations of all residuals.
+    pub evaluations: u32,
+}
+
+// SAFETY: plain numbers, and padding that nobody reads.
+unsafe impl<T: Plain> Plain for TriangulatedPoint<T> {}
+// SAFETY: plain numbers, and padding that nobody reads.
+unsafe impl<T: Plain> Plain for RefinedPoint<T> {}
 
 /// How a search went.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -94,43 +107,8 @@ pub struct SearchReport<T> {
     pub excluded_inlier_ratio: T,
 }
 
-/// What `epi_relative_pose` found.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(C)]
-pub struct RelativePoseEstimate<T> {
-    /// How the search went.
-    pub report: SearchReport<T>,
-    /// One of `epi_relative_pose_verdict`.
-    pub verdict: u32,
-    /// One of `epi_unobservable`.
-    pub unobservable: u32,
-    /// Poses found: 1 of a general motion, 1 or 2 of a plane, else 0.
-    pub pose_count: u32,
-    /// Rows of each covariance: 5, 8 or 3 by the verdict, 0 where the inliers leave a direction open.
-    pub covariance_size: [u32; 2],
-    /// Robust estimate of the noise of one image coordinate, pixels; 0 without inliers.
-    pub noise_px: T,
-    /// Of view 2 in the frame of view 1, |t| = 1.
-    pub poses: [Pose<T>; 2],
-    /// Of a plane: its unit normal in the frame of view 1.
-    pub normals: [[T; 3]; 2],
-    /// Of a plane: the length of the true translation over the plane's distance from view 1.
-    pub baseline_over_distance: [T; 2],
-    /// Row-major, in the first `covariance_size` squared numbers. Order: `kernel/CONVENTIONS.md`.
-    pub covariance: [[T; 64]; 2],
-}
-
-// SAFETY: plain numbers that begin with the size.
-unsafe impl<T: Real> Grows for RelativePoseOptions<T> {
-    const FIRST: usize = size_of::<Self>();
-}
-// SAFETY: plain numbers.
-unsafe impl<T: Real> Grows for RelativePoseEstimate<T> {
-    const FIRST: usize = size_of::<Self>();
-}
-
 impl<T: Real> Pose<T> {
-    const fn zero() -> Self {
+    pub(crate) const fn zero() -> Self {
         Self { rotation: [T::ZERO; 4], translation: [T::ZERO; 3] }
     }
 
@@ -156,6 +134,16 @@ pub(crate) fn rotation<T: Real>(q: &[T; 4]) -> Result<UnitQuaternion<T>, Status>
         return Err(Status::Rotation);
     }
     Ok(UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k)))
+}
+
+/// The rows of a matrix.
+pub(crate) fn rows<T: Real, const R: usize, const C: usize>(matrix: &SMatrix<T, R, C>) -> [[T; C]; R] {
+    matrix.transpose().data.0
+}
+
+/// The matrix of these rows.
+pub(crate) fn from_rows<T: Real, const R: usize, const C: usize>(rows: [[T; C]; R]) -> SMatrix<T, R, C> {
+    SMatrix::<T, C, R>::from(rows).transpose()
 }
 
 /// `i j k w`.
@@ -186,46 +174,8 @@ impl<T: Real> Camera<T> {
     }
 }
 
-impl<T: Real> RelativePoseOptions<T> {
-    /// The defaults of the kernel.
-    pub(crate) fn new() -> Self {
-        let kernel = estimate::RelativePoseOptions::<T>::default();
-        let search = kernel.ransac;
-        Self {
-            size: size_of::<Self>() as u32,
-            min_iterations: search.min_iterations,
-            max_iterations: search.budget.max_iterations,
-            max_solver_calls: search.budget.max_solver_calls,
-            max_residuals: search.budget.max_residuals,
-            seed: search.seed,
-            confidence: search.confidence,
-            max_error_px: kernel.max_error_px,
-            sigma_px: T::ZERO,
-        }
-    }
-
-    /// The options of the kernel.
-    pub(crate) fn to_kernel(self) -> estimate::RelativePoseOptions<T> {
-        let mut kernel = estimate::RelativePoseOptions::default();
-        kernel.max_error_px = self.max_error_px;
-        kernel.sigma_px = given(self.sigma_px);
-        kernel.ransac.confidence = self.confidence;
-        kernel.ransac.min_iterations = self.min_iterations;
-        kernel.ransac.seed = self.seed;
-        kernel.ransac.budget.max_iterations = self.max_iterations;
-        kernel.ransac.budget.max_solver_calls = self.max_solver_calls;
-        kernel.ransac.budget.max_residuals = self.max_residuals;
-        kernel
-    }
-}
-
-/// A number for which 0 means the default.
-fn given<T: Real>(x: T) -> Option<T> {
-    (x != T::ZERO).then_some(x)
-}
-
 impl<T: Real> SearchReport<T> {
-    const fn zero() -> Self {
+    pub(crate) const fn zero() -> Self {
         Self {
             residuals: 0,
             iterations: 0,
@@ -268,81 +218,35 @@ impl<T: Real> From<RansacReport<T>> for SearchReport<T> {
     }
 }
 
-impl<T: Real> RelativePoseEstimate<T> {
-    /// Without a pose.
-    fn empty(verdict: enums::RelativePoseVerdict) -> Self {
-        Self {
-            report: SearchReport::zero(),
+impl<T: Real> From<Triangulation<T>> for TriangulatedPoint<T> {
+    fn from(kernel: Triangulation<T>) -> Self {
+        use enums::TriangulationVerdict as C;
+        let plain = |point: Vector3<T>, verdict: C| Self {
+            point: point.into(),
             verdict: verdict as u32,
-            unobservable: enums::Unobservable::No as u32,
-            pose_count: 0,
-            covariance_size: [0; 2],
-            noise_px: T::ZERO,
-            poses: [Pose::zero(); 2],
-            normals: [[T::ZERO; 3]; 2],
-            baseline_over_distance: [T::ZERO; 2],
-            covariance: [[T::ZERO; 64]; 2],
+            view: 0,
+            behind: 0,
+        };
+        match kernel {
+            Triangulation::Point(point) => plain(point, C::Point),
+            Triangulation::Behind { point, view, count } => {
+                Self { view: view as u32, behind: count as u32, ..plain(point, C::Behind) }
+            }
+            Triangulation::AtInfinity { direction } => plain(direction, C::AtInfinity),
+            Triangulation::Undetermined => plain(Vector3::zeros(), C::Undetermined),
         }
     }
 }
 
-impl<T: Real> From<&estimate::RelativePoseEstimate<T>> for RelativePoseEstimate<T> {
-    fn from(kernel: &estimate::RelativePoseEstimate<T>) -> Self {
-        use enums::RelativePoseVerdict as C;
-        use estimate::RelativePoseVerdict as Kernel;
-        let mut found = match &kernel.verdict {
-            Kernel::General(motion) => {
-                let mut found = Self::empty(C::General);
-                found.pose_count = 1;
-                found.poses[0] = motion.pose.into();
-                found.covariance_size[0] = row_major(&motion.covariance, &mut found.covariance[0]);
-                found
-            }
-            Kernel::Planar(poses) => {
-                let mut found = Self::empty(C::Planar);
-                for (k, planar) in poses.iter().enumerate().take(2) {
-                    found.pose_count += 1;
-                    found.poses[k] = planar.pose.into();
-                    found.normals[k] = planar.normal.into();
-                    found.baseline_over_distance[k] = planar.baseline_over_distance;
-                    found.covariance_size[k] = row_major(&planar.covariance, &mut found.covariance[k]);
-                }
-                found
-            }
-            Kernel::PureRotation(pure) => {
-                let mut found = Self::empty(C::PureRotation);
-                found.poses[0].rotation = quaternion(&pure.rotation);
-                found.covariance_size[0] = row_major(&pure.covariance, &mut found.covariance[0]);
-                found
-            }
-            Kernel::NoMotion => Self::empty(C::NoMotion),
-            Kernel::Unobservable(why) => {
-                Self { unobservable: reason(*why) as u32, ..Self::empty(C::Unobservable) }
-            }
-            Kernel::TooFewInliers => Self::empty(C::TooFewInliers),
-            Kernel::NoConsensus => Self::empty(C::NoConsensus),
-            _ => Self::empty(C::Other),
-        };
-        found.report = kernel.report.into();
-        found.noise_px = kernel.noise_px;
-        found
+impl<T: Real> From<triangulation::RefinedPoint<T>> for RefinedPoint<T> {
+    fn from(kernel: triangulation::RefinedPoint<T>) -> Self {
+        Self {
+            point: kernel.point.into(),
+            cost_px_sq: kernel.cost_px_sq,
+            covariance_per_px_sq: kernel.covariance_per_px_sq.map_or([[T::ZERO; 3]; 3], |c| rows(&c)),
+            has_covariance: u32::from(kernel.covariance_per_px_sq.is_some()),
+            converged: u32::from(kernel.converged),
+            evaluations: kernel.evaluations,
+        }
     }
-}
-
-fn reason(why: estimate::Unobservable) -> enums::Unobservable {
-    match why {
-        estimate::Unobservable::Collinear => enums::Unobservable::Collinear,
-        estimate::Unobservable::TooFewDistinct => enums::Unobservable::TooFewDistinct,
-        _ => enums::Unobservable::Other,
-    }
-}
-
-/// A matrix by rows into the first of `numbers`; its size, 0 without one.
-fn row_major<T: Real, const N: usize>(matrix: &Option<SMatrix<T, N, N>>, numbers: &mut [T]) -> u32 {
-    let Some(matrix) = matrix else { return 0 };
-    let transposed = matrix.transpose();
-    for (to, &from) in numbers.iter_mut().zip(transposed.iter()) {
-        *to = from;
-    }
-    N as u32
 }

@@ -54,6 +54,11 @@ impl<'a> Memory<'a> {
         self.bytes.clone()
     }
 
+    #[cfg(feature = "bundle")]
+    pub(crate) fn start(&self) -> *mut u8 {
+        self.start
+    }
+
     /// The slices of an estimation of `count` correspondences of `width` numbers of `T`, the mask cleared.
     pub(crate) fn cut<T: Real + Plain>(self, width: usize, count: usize) -> Result<Slices<'a, T>, Status> {
         let needed = size::<T>(width, count);

@@ -28,6 +28,7 @@ fn for_scalar(text: &str, scalar: &str) -> String {
         match (&name, line.split_once(" extern \"C\" fn ")) {
             (Some(exported), Some((before, after))) => {
                 let (_, arguments) = after.split_once('(').expect("a function");
+                let arguments = arguments.replace("Scalar", scalar);
                 writeln!(out, "{before} extern \"C\" fn {exported}({arguments}").unwrap();
                 name = None;
             }
@@ -57,7 +58,17 @@ fn declared(text: &str, keyword: &str) -> Vec<String> {
 
 fn header(root: &Path) -> String {
     let source = root.join("src");
-    let plain = ["status.rs", "enums.rs", "types.rs", "workspace.rs"].map(|file| read(&source.join(file)));
+    let plain = [
+        "status.rs",
+        "limits.rs",
+        "workspace.rs",
+        "enums.rs",
+        "types.rs",
+        "options.rs",
+        "estimates.rs",
+        "window.rs",
+    ]
+    .map(|file| read(&source.join(file)));
     let mut text = plain.concat().replace("#[unsafe(export_name = \"epi_", "#[unsafe(no_mangle)] // ");
     // Functions without a scalar.
     for name in ["abi_version", "status_string", "workspace_align"] {

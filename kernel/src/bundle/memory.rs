@@ -24,6 +24,18 @@ pub struct PointHandle {
 }
 
 impl FrameHandle {
+    /// The handle as a number, for an interface that knows no types.
+    #[must_use]
+    pub const fn to_bits(self) -> u32 {
+        (self.generation as u32) << 16 | self.index as u32
+    }
+
+    /// The handle of a number. Of one that no handle gave it names no frame, and a window says so.
+    #[must_use]
+    pub const fn from_bits(bits: u32) -> Self {
+        Self { index: bits as u16, generation: (bits >> 16) as u16 }
+    }
+
     /// The slot, from 0; slots of removed frames are used again.
     #[must_use]
     pub const fn index(self) -> usize {
@@ -32,6 +44,18 @@ impl FrameHandle {
 }
 
 impl PointHandle {
+    /// The handle as a number, for an interface that knows no types.
+    #[must_use]
+    pub const fn to_bits(self) -> u32 {
+        (self.generation as u32) << 16 | self.index as u32
+    }
+
+    /// The handle of a number. Of one that no handle gave it names no point, and a window says so.
+    #[must_use]
+    pub const fn from_bits(bits: u32) -> Self {
+        Self { index: bits as u16, generation: (bits >> 16) as u16 }
+    }
+
     /// The slot, from 0; slots of removed points are used again.
     #[must_use]
     pub const fn index(self) -> usize {

@@ -4,9 +4,9 @@ use epipole::geometry::CameraModel;
 use epipole::nalgebra::{Vector2, Vector3};
 
 use super::Scalar;
-use crate::raw::{Input, Output, disjoint};
+use crate::raw::lend;
 use crate::status::answer;
-use crate::types::Camera;
+use crate::types::{Camera, rows};
 
 /// The pixels of points of the camera frame.
 ///
@@ -24,25 +24,11 @@ pub unsafe extern "C" fn camera_project(
     visible: *mut u8,
 ) -> i32 {
     answer(|| {
-        // SAFETY: the caller's promise.
-        let (camera, points, mut pixels, mut visible) = unsafe {
-            (
-                Input::<Camera<Scalar>>::new(camera, 1)?,
-                Input::<Vector3<Scalar>>::new(points, count)?,
-                Output::<[Scalar; 2]>::new(pixels, count)?,
-                Output::<u8>::new(visible, count)?,
-            )
-        };
-        disjoint(&[camera.bytes(), points.bytes()], &[pixels.bytes(), visible.bytes()])?;
+        lend!(in { camera: [Camera<Scalar>; 1], points: [Vector3<Scalar>; count] }
+            out { pixels: [[Scalar; 2]; count], visible: [u8; count] });
         let camera = camera.value()?.to_kernel()?;
-        let mut seen = 0;
-        pixels.write(points.slice.iter().map(|point| {
-            let pixel = camera.project(point);
-            visible.push(u8::from(pixel.is_some()));
-            seen += usize::from(pixel.is_some());
-            pixel.map_or([0.0; 2], Into::into)
-        }));
-        Ok(seen)
+        let found = points.slice.iter().map(|point| camera.project(point).map(Into::into));
+        Ok(pixels.write_masked(&mut visible, found, [0.0; 2]))
     })
 }
 
@@ -62,24 +48,51 @@ pub unsafe extern "C" fn camera_unproject(
     valid: *mut u8,
 ) -> i32 {
     answer(|| {
-        // SAFETY: the caller's promise.
-        let (camera, pixels, mut bearings, mut valid) = unsafe {
-            (
-                Input::<Camera<Scalar>>::new(camera, 1)?,
-                Input::<Vector2<Scalar>>::new(pixels, count)?,
-                Output::<[Scalar; 3]>::new(bearings, count)?,
-                Output::<u8>::new(valid, count)?,
-            )
-        };
-        disjoint(&[camera.bytes(), pixels.bytes()], &[bearings.bytes(), valid.bytes()])?;
+        lend!(in { camera: [Camera<Scalar>; 1], pixels: [Vector2<Scalar>; count] }
+            out { bearings: [[Scalar; 3]; count], valid: [u8; count] });
         let camera = camera.value()?.to_kernel()?;
-        let mut found = 0;
-        bearings.write(pixels.slice.iter().map(|pixel| {
-            let bearing = camera.unproject(pixel).ok();
-            valid.push(u8::from(bearing.is_some()));
-            found += usize::from(bearing.is_some());
-            bearing.map_or([0.0; 3], Into::into)
-        }));
-        Ok(found)
+        let found = pixels.slice.iter().map(|pixel| camera.unproject(pixel).ok().map(Into::into));
+        Ok(bearings.write_masked(&mut valid, found, [0.0; 3]))
+    })
+}
+
+/// The pixel of one point with its Jacobian by the point: 2x3 by rows. Answers 1, or 0 where the camera does not see it.
+///
+/// # Safety
+/// See the crate.
+#[unsafe(export_name = name!("camera_project_with_jacobian"))]
+pub unsafe extern "C" fn camera_project_with_jacobian(
+    camera: *const Camera<Scalar>,
+    point: *const Scalar,
+    pixel: *mut Scalar,
+    jacobian: *mut Scalar,
+) -> i32 {
+    answer(|| {
+        lend!(in { camera: [Camera<Scalar>; 1], point: [Vector3<Scalar>; 1] }
+            out { pixel: [[Scalar; 2]; 1], jacobian: [[[Scalar; 3]; 2]; 1] });
+        let found = camera.value()?.to_kernel()?.project_with_jacobian(&point.value()?);
+        jacobian.write(found.map(|(_, j)| rows(&j)));
+        Ok(pixel.write(found.map(|(pixel, _)| pixel.into())))
+    })
+}
+
+/// The unit bearing of one pixel with its Jacobian by the pixel, rad/px: 3x2 by rows. Answers 1, or 0 where the lens has
+/// none.
+///
+/// # Safety
+/// See the crate.
+#[unsafe(export_name = name!("camera_unproject_with_jacobian"))]
+pub unsafe extern "C" fn camera_unproject_with_jacobian(
+    camera: *const Camera<Scalar>,
+    pixel: *const Scalar,
+    bearing: *mut Scalar,
+    jacobian: *mut Scalar,
+) -> i32 {
+    answer(|| {
+        lend!(in { camera: [Camera<Scalar>; 1], pixel: [Vector2<Scalar>; 1] }
+            out { bearing: [[Scalar; 3]; 1], jacobian: [[[Scalar; 2]; 3]; 1] });
+        let found = camera.value()?.to_kernel()?.unproject_with_jacobian(&pixel.value()?).ok();
+        jacobian.write(found.map(|(_, j)| rows(&j)));
+        Ok(bearing.write(found.map(|(bearing, _)| bearing.into())))
     })
 }

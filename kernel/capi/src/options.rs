@@ -1,0 +1,327 @@
+//! Options of the robust estimators and of refinement: filled by a `_default` function, their size first.
+
+use epipole::Real;
+use epipole::nalgebra::Vector3;
+use epipole::robust::loss::Loss;
+use epipole::{estimate, refine};
+
+use crate::Status;
+use crate::enums;
+use crate::raw::Grows;
+use crate::types::{Pose, from_rows};
+
+/// Options of `epi_relative_pose`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct RelativePoseOptions<T> {
+    /// Of this struct, in bytes.
+    pub size: u32,
+    /// Samples drawn at the least.
+    pub min_iterations: u32,
+    /// Samples drawn at the most.
+    pub max_iterations: u32,
+    /// Minimal problems solved at the most.
+    pub max_solver_calls: u32,
+    /// Residuals evaluated at the most.
+    pub max_residuals: u64,
+    /// The same seed and input give the same bits.
+    pub seed: u64,
+    /// Probability, in (0, 1), that a sample of inliers only has been drawn when the search stops by itself.
+    pub confidence: T,
+    /// Largest Sampson error of an inlier, pixels.
+    pub max_error_px: T,
+    /// Standard deviation of the noise of one image coordinate, pixels; 0 for half of `max_error_px`.
+    pub sigma_px: T,
+}
+
+/// Options of `epi_homography`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct HomographyOptions<T> {
+    /// Of this struct, in bytes.
+    pub size: u32,
+    /// Samples drawn at the least.
+    pub min_iterations: u32,
+    /// Samples drawn at the most.
+    pub max_iterations: u32,
+    /// Minimal problems solved at the most.
+    pub max_solver_calls: u32,
+    /// Residuals evaluated at the most.
+    pub max_residuals: u64,
+    /// The same seed and input give the same bits.
+    pub seed: u64,
+    /// Probability, in (0, 1), that a sample of inliers only has been drawn when the search stops by itself.
+    pub confidence: T,
+    /// Largest transfer error of an inlier, pixels.
+    pub max_error_px: T,
+    /// Standard deviation of the noise of one image coordinate, pixels; 0 for a third of `max_error_px`.
+    pub sigma_px: T,
+}
+
+/// Options of `epi_fundamental`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct FundamentalOptions<T> {
+    /// Of this struct, in bytes.
+    pub size: u32,
+    /// Samples drawn at the least.
+    pub min_iterations: u32,
+    /// Samples drawn at the most.
+    pub max_iterations: u32,
+    /// Minimal problems solved at the most.
+    pub max_solver_calls: u32,
+    /// Residuals evaluated at the most.
+    pub max_residuals: u64,
+    /// The same seed and input give the same bits.
+    pub seed: u64,
+    /// Probability, in (0, 1), that a sample of inliers only has been drawn when the search stops by itself.
+    pub confidence: T,
+    /// Largest Sampson error of an inlier, pixels.
+    pub max_error_px: T,
+    /// Standard deviation of the noise of one image coordinate, pixels; 0 for half of `max_error_px`.
+    pub sigma_px: T,
+}
+
+/// Options of `epi_absolute_pose`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct AbsolutePoseOptions<T> {
+    /// Of this struct, in bytes.
+    pub size: u32,
+    /// Samples drawn at the least.
+    pub min_iterations: u32,
+    /// Samples drawn at the most.
+    pub max_iterations: u32,
+    /// Minimal problems solved at the most.
+    pub max_solver_calls: u32,
+    /// Residuals evaluated at the most.
+    pub max_residuals: u64,
+    /// The same seed and input give the same bits.
+    pub seed: u64,
+    /// Probability, in (0, 1), that a sample of inliers only has been drawn when the search stops by itself.
+    pub confidence: T,
+    /// Largest reprojection error of an inlier, pixels.
+    pub max_error_px: T,
+    /// Standard deviation of the noise of one image coordinate, pixels; 0 for half of `max_error_px`.
+    pub sigma_px: T,
+    /// Of a gravity prior: its direction in the world, of any length.
+    pub gravity_world: [T; 3],
+    /// Its direction in the camera, of any length.
+    pub gravity_camera: [T; 3],
+    /// Standard deviation of the angle between the two, rad.
+    pub gravity_sigma_rad: T,
+    /// 1 if gravity is known, else 0 and the three above are ignored.
+    pub has_gravity: u32,
+}
+
+/// Options of `epi_refine_absolute_pose`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct RefineAbsolutePoseOptions<T> {
+    /// Of this struct, in bytes.
+    pub size: u32,
+    /// Passes over the correspondences at the most.
+    pub max_passes: u32,
+    /// Of the reprojection error: one of `epi_loss`.
+    pub loss: u32,
+    /// 1 if a prior is given, else 0 and the prior is ignored.
+    pub has_prior: u32,
+    /// Scale of the loss, pixels.
+    pub loss_scale: T,
+    /// Standard deviation of the noise of one image coordinate, pixels.
+    pub sigma_px: T,
+    /// The pose that a prior expects.
+    pub prior_pose: Pose<T>,
+    /// The inverse of its covariance, rotation (rad) then translation: 6x6 by rows.
+    pub prior_information: [[T; 6]; 6],
+}
+
+// SAFETY: plain numbers that begin with the size.
+unsafe impl<T: Real> Grows for RelativePoseOptions<T> {
+    const FIRST: usize = size_of::<Self>();
+}
+// SAFETY: plain numbers that begin with the size.
+unsafe impl<T: Real> Grows for HomographyOptions<T> {
+    const FIRST: usize = size_of::<Self>();
+}
+// SAFETY: plain numbers that begin with the size.
+unsafe impl<T: Real> Grows for FundamentalOptions<T> {
+    const FIRST: usize = size_of::<Self>();
+}
+// SAFETY: plain numbers that begin with the size.
+unsafe impl<T: Real> Grows for AbsolutePoseOptions<T> {
+    const FIRST: usize = size_of::<Self>();
+}
+// SAFETY: plain numbers that begin with the size.
+unsafe impl<T: Real> Grows for RefineAbsolutePoseOptions<T> {
+    const FIRST: usize = size_of::<Self>();
+}
+
+/// Options as their `_default` function fills them, for a caller that knows `size` bytes of them.
+pub(crate) trait Defaults: Grows {
+    fn defaults(size: usize) -> Self;
+}
+
+macro_rules! search_options {
+    ($name:ident $(, $field:ident: $value:expr)*) => {
+        impl<T: Real> Defaults for $name<T> {
+            fn defaults(size: usize) -> Self {
+                let kernel = estimate::$name::<T>::default();
+                let search = kernel.ransac;
+                Self {
+                    size: size as u32,
+                    min_iterations: search.min_iterations,
+                    max_iterations: search.budget.max_iterations,
+                    max_solver_calls: search.budget.max_solver_calls,
+                    max_residuals: search.budget.max_residuals,
+                    seed: search.seed,
+                    confidence: search.confidence,
+                    max_error_px: kernel.max_error_px,
+                    sigma_px: T::ZERO,
+                    $($field: $value,)*
+                }
+            }
+        }
+
+        impl<T: Real> $name<T> {
+            /// The kernel's options of the search.
+            fn search(&self) -> estimate::$name<T> {
+                let mut kernel = estimate::$name::<T>::default();
+                kernel.max_error_px = self.max_error_px;
+                // 0 stands for the default.
+                kernel.sigma_px = (self.sigma_px != T::ZERO).then_some(self.sigma_px);
+                kernel.ransac.confidence = self.confidence;
+                kernel.ransac.min_iterations = self.min_iterations;
+                kernel.ransac.seed = self.seed;
+                kernel.ransac.budget.max_iterations = self.max_iterations;
+                kernel.ransac.budget.max_solver_calls = self.max_solver_calls;
+                kernel.ransac.budget.max_residuals = self.max_residuals;
+                kernel
+            }
+        }
+    };
+}
+
+search_options!(RelativePoseOptions);
+search_options!(HomographyOptions);
+search_options!(FundamentalOptions);
+search_options!(
+    AbsolutePoseOptions,
+    gravity_world: [T::ZERO; 3],
+    gravity_camera: [T::ZERO; 3],
+    gravity_sigma_rad: T::ZERO,
+    has_gravity: 0
+);
+
+impl<T: Real> RelativePoseOptions<T> {
+    pub(crate) fn to_kernel(self) -> Result<estimate::RelativePoseOptions<T>, Status> {
+        Ok(self.search())
+    }
+}
+
+impl<T: Real> HomographyOptions<T> {
+    pub(crate) fn to_kernel(self) -> Result<estimate::HomographyOptions<T>, Status> {
+        Ok(self.search())
+    }
+}
+
+impl<T: Real> FundamentalOptions<T> {
+    pub(crate) fn to_kernel(self) -> Result<estimate::FundamentalOptions<T>, Status> {
+        Ok(self.search())
+    }
+}
+
+impl<T: Real> AbsolutePoseOptions<T> {
+    pub(crate) fn to_kernel(self) -> Result<estimate::AbsolutePoseOptions<T>, Status> {
+        let mut kernel = self.search();
+        kernel.gravity = flag(self.has_gravity)?.then(|| estimate::GravityPrior {
+            world: Vector3::from(self.gravity_world),
+            camera: Vector3::from(self.gravity_camera),
+            sigma_rad: self.gravity_sigma_rad,
+        });
+        Ok(kernel)
+    }
+}
+
+impl<T: Real> Defaults for RefineAbsolutePoseOptions<T> {
+    fn defaults(size: usize) -> Self {
+        let kernel = refine::RefineAbsolutePoseOptions::<T>::default();
+        let (loss, loss_scale) = loss_parts(kernel.loss);
+        Self {
+            size: size as u32,
+            max_passes: kernel.max_passes,
+            loss,
+            has_prior: 0,
+            loss_scale,
+            sigma_px: kernel.sigma_px,
+            prior_pose: Pose::zero(),
+            prior_information: [[T::ZERO; 6]; 6],
+        }
+    }
+}
+
+impl<T: Real> RefineAbsolutePoseOptions<T> {
+    pub(crate) fn to_kernel(self) -> Result<refine::RefineAbsolutePoseOptions<T>, Status> {
+        let mut kernel = refine::RefineAbsolutePoseOptions::default();
+        kernel.max_passes = self.max_passes;
+        kernel.loss = loss(self.loss, self.loss_scale)?;
+        kernel.sigma_px = positive(self.sigma_px, Status::Sigma)?;
+        kernel.prior = match flag(self.has_prior)? {
+            true => {
+                let information = from_rows(self.prior_information);
+                if !information.iter().all(|&x| epipole::real::is_finite(x)) {
+                    return Err(Status::NotFinite);
+                }
+                Some(refine::PosePrior { pose: self.prior_pose.to_kernel()?, information })
+            }
+            false => None,
+        };
+        Ok(kernel)
+    }
+}
+
+/// A yes or no of C.
+pub(crate) fn flag(value: u32) -> Result<bool, Status> {
+    match value {
+        0 => Ok(false),
+        1 => Ok(true),
+        _ => Err(Status::UnknownEnum),
+    }
+}
+
+fn positive<T: Real>(value: T, status: Status) -> Result<T, Status> {
+    if value > T::ZERO && epipole::real::is_finite(value) { Ok(value) } else { Err(status) }
+}
+
+/// The loss of a kind and a scale.
+pub(crate) fn loss<T: Real>(kind: u32, scale: T) -> Result<Loss<T>, Status> {
+    const SQUARED: u32 = enums::Loss::Squared as u32;
+    const TRUNCATED: u32 = enums::Loss::Truncated as u32;
+    const HUBER: u32 = enums::Loss::Huber as u32;
+    const CAUCHY: u32 = enums::Loss::Cauchy as u32;
+    const TUKEY: u32 = enums::Loss::Tukey as u32;
+    const GEMAN_MCCLURE: u32 = enums::Loss::GemanMcClure as u32;
+    let make = match kind {
+        SQUARED => return Ok(Loss::Squared),
+        TRUNCATED => Loss::Truncated,
+        HUBER => Loss::Huber,
+        CAUCHY => Loss::Cauchy,
+        TUKEY => Loss::Tukey,
+        GEMAN_MCCLURE => Loss::GemanMcClure,
+        _ => return Err(Status::UnknownEnum),
+    };
+    Ok(make(positive(scale, Status::BadOption)?))
+}
+
+/// Kind and scale of a loss.
+pub(crate) fn loss_parts<T: Real>(loss: Loss<T>) -> (u32, T) {
+    let (kind, scale) = match loss {
+        Loss::Squared => (enums::Loss::Squared, T::ONE),
+        Loss::Truncated(k) => (enums::Loss::Truncated, k),
+        Loss::Huber(k) => (enums::Loss::Huber, k),
+        Loss::Cauchy(k) => (enums::Loss::Cauchy, k),
+        Loss::Tukey(k) => (enums::Loss::Tukey, k),
+        Loss::GemanMcClure(k) => (enums::Loss::GemanMcClure, k),
+    };
+    (kind as u32, scale)
+}
