@@ -5,11 +5,12 @@ use epipole::estimate::{
     relative_pose, relative_pose_guided,
 };
 use epipole::geometry::pose::tangent_basis;
-use epipole::geometry::{BrownConrady, CameraModel, KannalaBrandt, Pinhole};
-use epipole::nalgebra::{Point3, SVector, Vector2};
+use epipole::geometry::{BrownConrady, CameraModel, KannalaBrandt, Pinhole, Pose};
+use epipole::nalgebra::{Point3, SVector, UnitQuaternion, Vector2, Vector3};
 use epipole::real::lit;
 use epipole::robust::{Guide, OptionsError, StopReason};
 use epipole::{InputError, Real};
+use epipole_host_tests::bundle::problem::cast_pose;
 use epipole_host_tests::matchers::pose_error;
 use epipole_host_tests::scenes::{Motion, Scene, Shape};
 use epipole_host_tests::two_view::{Memory, estimate_pixels, estimate_scene, scene_camera};
@@ -298,6 +299,37 @@ fn lenses() {
         .all(|e| e.is_some_and(|(r, t)| r < 0.5 * DEGREE && t < 4.0 * DEGREE))
     });
     assert!(share.value() >= 0.9, "{share:?}");
+}
+
+/// A start that is no pose is an error, and nothing is touched.
+#[test]
+fn a_start_that_is_no_pose_is_named() {
+    let problem = Scene::new(Motion::General, 40).generate(1);
+    let (x1, x2) = problem.pixels::<f32>();
+    let camera = scene_camera();
+    let (mut memory, good) = (Memory::new(40), cast_pose::<f64, f32>(&problem.pose));
+    let mut workspace = memory.workspace();
+    for bad in [f32::NAN, f32::INFINITY] {
+        for entry in 0..7 {
+            let mut pose = good;
+            match entry {
+                0..4 => {
+                    pose.rotation = UnitQuaternion::new_unchecked({
+                        let mut q = pose.rotation.into_inner();
+                        q[entry] = bad;
+                        q
+                    })
+                }
+                _ => pose.translation.vector[entry - 4] = bad,
+            }
+            let found = refine_relative_pose(&camera, &camera, &x1, &x2, &pose, &options(), &mut workspace);
+            assert_eq!(found, Err(RelativePoseError::Pose), "{pose:?}");
+        }
+    }
+    let still = Pose::from_parts(Vector3::zeros().into(), good.rotation);
+    let found = refine_relative_pose(&camera, &camera, &x1, &x2, &still, &options(), &mut workspace);
+    assert_eq!(found, Err(RelativePoseError::Pose));
+    assert!(workspace.inliers().is_empty());
 }
 
 /// The covariance is calibrated: the normalised squared error of a pose has its 5 degrees of freedom as its mean.

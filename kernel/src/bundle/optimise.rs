@@ -67,7 +67,12 @@ impl<T: Real> Window<'_, T> {
         self.optimise_while(options, |_| true)
     }
 
-    /// [`optimise`](Self::optimise) as long as `go_on` says yes; it is asked before every iteration.
+    /// [`optimise`](Self::optimise) as long as `go_on` says yes; it is asked before every iteration, with what has been done so
+    /// far: the place for a timer.
+    ///
+    /// # Returns
+    /// As [`optimise`](Self::optimise), with [`Termination::Interrupted`](super::Termination::Interrupted) where `go_on` said
+    /// no: the window is then at the best place found.
     ///
     /// # Errors
     /// As [`optimise`](Self::optimise).
@@ -86,6 +91,9 @@ impl<T: Real> Window<'_, T> {
 
     /// Moves one frame alone, all else held: pose-only refinement, for a new frame of known points.
     ///
+    /// # Returns
+    /// The report, as [`optimise`](Self::optimise).
+    ///
     /// # Errors
     /// As [`optimise`](Self::optimise); [`BundleError::StaleFrame`].
     pub fn refine_frame(
@@ -98,6 +106,9 @@ impl<T: Real> Window<'_, T> {
     }
 
     /// Moves one point alone, all frames held: refinement of an N-view triangulation.
+    ///
+    /// # Returns
+    /// The report, as [`optimise`](Self::optimise).
     ///
     /// # Errors
     /// As [`optimise`](Self::optimise); [`BundleError::StalePoint`].
@@ -112,8 +123,15 @@ impl<T: Real> Window<'_, T> {
 
     /// How well the observations of a point agree with it where it is, `outlier_sigma` deviations being the limit.
     ///
+    /// # Returns
+    /// How many observations there are, how many lie behind their camera or beyond the limit, and their errors: what a caller
+    /// needs to drop a point.
+    ///
     /// # Errors
     /// [`BundleError::StalePoint`].
+    ///
+    /// # Cost
+    /// One projection an observation of the point.
     pub fn point_report(&self, point: PointHandle, outlier_sigma: T) -> Result<PointReport<T>, BundleError> {
         let position = &self.point(point).map_err(|_| BundleError::StalePoint)?.position;
         let mut report = PointReport { observations: 0, outliers: 0, behind: 0, rms_sigma: T::ZERO };

@@ -20,6 +20,7 @@ pub enum Unknowns {
 
 /// Options of [`Window::optimise`](super::Window::optimise).
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BundleOptions<T> {
     /// The loss on an observation's distance in standard deviations. [`Loss::Huber`] has one minimum more often;
     /// a redescending loss ([`Loss::Tukey`], [`Loss::GemanMcClure`], [`Loss::Cauchy`]) forgets gross errors
@@ -102,6 +103,7 @@ pub enum Termination {
 
 /// What the caller is told before each iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Progress<T> {
     /// Iterations done.
     pub iterations: u32,
@@ -115,6 +117,7 @@ pub struct Progress<T> {
 
 /// What an optimisation did.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
 pub struct BundleReport<T> {
     /// Why it ended.
@@ -142,6 +145,7 @@ pub struct BundleReport<T> {
 
 /// How well the observations of one point agree with it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PointReport<T> {
     /// Observations.
     pub observations: usize,

@@ -14,6 +14,8 @@ pub enum TwoViewError {
     Input(InputError),
     /// An option is out of its range.
     Options(OptionsError),
+    /// The pose to start from is not finite, or its translation is zero.
+    Pose,
 }
 
 impl fmt::Display for TwoViewError {
@@ -21,6 +23,7 @@ impl fmt::Display for TwoViewError {
         match self {
             Self::Input(error) => error.fmt(f),
             Self::Options(error) => error.fmt(f),
+            Self::Pose => f.write_str("the pose to start from is not finite, or its translation is zero"),
         }
     }
 }

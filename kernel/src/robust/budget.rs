@@ -7,6 +7,7 @@ use crate::real::{is_finite, lit};
 
 /// Limits and seed of a robust estimation. The defaults suit every estimator of this crate.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct RansacOptions<T> {
     /// Probability, in (0, 1), that a sample of inliers only has been drawn when the run stops by itself.

@@ -37,6 +37,7 @@ pub trait Estimator<T: Real, const S: usize> {
 
 /// What scoring adds up.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ScoreCounts {
     /// Residuals evaluated.
     pub residuals: u64,

@@ -8,6 +8,7 @@ use crate::real::lit;
 /// Scales are in the residual's unit. Cost and weight agree: the weight is the derivative of the cost by the squared
 /// residual.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Loss<T> {
     /// rho(s) = s.
     Squared,

@@ -6,6 +6,7 @@ use crate::real::{lit, ln};
 
 /// How well a model explains all correspondences.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Score<T> {
     /// Sum over the correspondences of min(r^2 / threshold^2, 1): lower is better.
     pub cost: T,

@@ -179,6 +179,27 @@ pub fn absolute_pose<T: Real>(
 }
 
 /// [`absolute_pose`], with match scores for ordered sampling, or with a caller's "may I go on?".
+///
+/// # Input
+/// As [`absolute_pose`], and a [`Guide`].
+///
+/// # Returns
+/// As [`absolute_pose`]. A run that the guide ended is repeated bit for bit by a budget of as many iterations as the report
+/// tells.
+///
+/// # Errors
+/// As [`absolute_pose`], and [`InputError::LengthMismatch`](crate::InputError) where there are scores but not one for each
+/// correspondence.
+///
+/// # Cost
+/// As [`absolute_pose`], and about `2 n log2 n` comparisons for the order of the scores.
+///
+/// # References
+/// O. Chum, J. Matas, "Matching with PROSAC", CVPR 2005.
+///
+/// # Examples
+/// See [`relative_pose_guided`](super::relative_pose_guided) and [`homography_guided`](super::homography_guided), which
+/// take a guide alike.
 pub fn absolute_pose_guided<T: Real>(
     camera: &impl CameraModel<T>,
     pixels: &[Vector2<T>],

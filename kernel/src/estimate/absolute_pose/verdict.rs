@@ -40,6 +40,7 @@ pub struct AbsolutePose<T: Real> {
 
 /// Whether a gravity prior helped.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum GravityFit<T> {
     /// The pose found agrees with the prior, which took part in its refinement. The angle between the two, rad.

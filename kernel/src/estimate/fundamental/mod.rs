@@ -31,6 +31,7 @@ pub type FundamentalWorkspace<'a, T> = TwoViewWorkspace<'a, T>;
 
 /// Options of [`fundamental`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct FundamentalOptions<T> {
     /// Largest Sampson error of an inlier, pixels. Default 1.
@@ -113,9 +114,26 @@ pub fn fundamental<T: Real>(
 
 /// [`fundamental`], with match scores for ordered sampling, or with a caller's "may I go on?".
 ///
+/// # Input
+/// As [`fundamental`], and a [`Guide`].
+///
+/// # Returns
+/// As [`fundamental`]. A run that the guide ended is repeated bit for bit by a budget of as many iterations as the report
+/// tells.
+///
 /// # Errors
 /// As [`fundamental`], and [`InputError::LengthMismatch`](crate::InputError) where there are scores but not one for each
 /// correspondence.
+///
+/// # Cost
+/// As [`fundamental`], and about `2 n log2 n` comparisons for the order of the scores.
+///
+/// # References
+/// O. Chum, J. Matas, "Matching with PROSAC", CVPR 2005.
+///
+/// # Examples
+/// See [`relative_pose_guided`](super::relative_pose_guided) and [`homography_guided`](super::homography_guided), which
+/// take a guide alike.
 pub fn fundamental_guided<T: Real>(
     x1: &[Vector2<T>],
     x2: &[Vector2<T>],

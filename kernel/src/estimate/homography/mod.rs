@@ -36,6 +36,7 @@ pub type HomographyWorkspace<'a, T> = TwoViewWorkspace<'a, T>;
 
 /// Options of [`homography`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct HomographyOptions<T> {
     /// Largest transfer error of an inlier, pixels: where the homography keeps scale, the distance in view 2 between
@@ -118,6 +119,44 @@ pub fn homography<T: Real>(
 }
 
 /// [`homography`], with match scores for ordered sampling, or with a caller's "may I go on?".
+///
+/// # Input
+/// As [`homography`], and a [`Guide`].
+///
+/// # Returns
+/// As [`homography`]. A run that the guide ended is repeated bit for bit by a budget of as many iterations as the report
+/// tells.
+///
+/// # Errors
+/// As [`homography`], and [`InputError::LengthMismatch`](crate::InputError) where there are scores but not one for each
+/// correspondence.
+///
+/// # Cost
+/// As [`homography`], and about `2 n log2 n` comparisons for the order of the scores.
+///
+/// # References
+/// O. Chum, J. Matas, "Matching with PROSAC", CVPR 2005.
+///
+/// # Examples
+/// ```
+/// use epipole::estimate::{HomographyOptions, HomographyStorage, homography_guided};
+/// use epipole::nalgebra::Vector2;
+/// use epipole::robust::Guide;
+///
+/// // A picture that moved by 12 pixels; every other match is wrong, and its score is the worse.
+/// let x1: [_; 40] = core::array::from_fn(|i| Vector2::new((i * 97 % 640) as f32, (i * 61 % 480) as f32));
+/// let mut x2 = x1.map(|x| Vector2::new(x.x + 12.0, x.y));
+/// let scores: [f32; 40] = core::array::from_fn(|i| if i % 2 == 0 { 0.3 } else { 0.8 });
+/// for i in (1..40).step_by(2) {
+///     x2[i] = Vector2::new((i * 53 % 640) as f32, (i * 89 % 480) as f32);
+/// }
+/// let guide = Guide { scores: Some(&scores), keep_going: None };
+/// let mut storage = HomographyStorage::<f32, 40>::new();
+/// let estimate = homography_guided(&x1, &x2, &HomographyOptions::default(), guide, &mut storage.workspace())?;
+/// let centre = estimate.homography().unwrap().transfer(&Vector2::new(320.0, 240.0)).unwrap();
+/// assert!((centre - Vector2::new(332.0, 240.0)).norm() < 0.01);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn homography_guided<T: Real>(
     x1: &[Vector2<T>],
     x2: &[Vector2<T>],

@@ -7,6 +7,7 @@ use super::load::{Units, check_pixels, load_bearings, load_planes};
 use super::workspace::RelativePoseWorkspace;
 use crate::geometry::{CameraModel, Pose};
 use crate::linalg::LANES;
+use crate::real::is_finite;
 use crate::refine::blocks::{BearingBlock, BlockSlice, EpipolarBlock, PlaneBlock};
 use crate::robust::budget::check_noise;
 use crate::robust::{Guide, RansacOptions, rank_by_score, ransac};
@@ -125,6 +126,45 @@ pub fn relative_pose<T: Real>(
 }
 
 /// [`relative_pose`], with match scores for ordered sampling, or with a caller's "may I go on?".
+///
+/// # Input
+/// As [`relative_pose`], and a [`Guide`]. Scores pay where the better matches are right more often: a wrong order costs
+/// little, since the pool of samples grows to all correspondences.
+///
+/// # Returns
+/// As [`relative_pose`]. A run that the guide ended is repeated bit for bit by a budget of as many iterations as the report
+/// tells.
+///
+/// # Errors
+/// As [`relative_pose`], and [`InputError::LengthMismatch`] where there are scores but not one for each correspondence.
+///
+/// # Cost
+/// As [`relative_pose`], and about `2 n log2 n` comparisons for the order of the scores.
+///
+/// # References
+/// O. Chum, J. Matas, "Matching with PROSAC", CVPR 2005.
+///
+/// # Examples
+/// ```
+/// use epipole::estimate::{RelativePoseOptions, RelativePoseStorage, relative_pose_guided};
+/// use epipole::geometry::Pinhole;
+/// use epipole::nalgebra::Vector2;
+/// use epipole::robust::{Guide, Progress, StopReason};
+///
+/// // Matches without sense, and a timer that lets the search do 24 iterations.
+/// let camera = Pinhole::new(500.0_f32, 500.0, 320.0, 240.0)?;
+/// let x1: [_; 40] = core::array::from_fn(|i| Vector2::new((i * 97 % 640) as f32, (i * 61 % 480) as f32));
+/// let x2: [_; 40] = core::array::from_fn(|i| Vector2::new((i * 53 % 640) as f32, (i * 89 % 480) as f32));
+/// let mut keep_going = |spent: &Progress| spent.iterations < 24;
+/// let guide = Guide { scores: None, keep_going: Some(&mut keep_going) };
+/// let mut storage = RelativePoseStorage::<f32, 40>::new();
+/// let options = RelativePoseOptions::default();
+/// let estimate =
+///     relative_pose_guided(&camera, &camera, &x1, &x2, &options, guide, &mut storage.workspace())?;
+/// assert_eq!(estimate.report.stop, StopReason::Interrupted);
+/// assert_eq!((estimate.report.spent.iterations, estimate.pose()), (24, None));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn relative_pose_guided<T: Real>(
     camera1: &impl CameraModel<T>,
     camera2: &impl CameraModel<T>,
@@ -188,7 +228,16 @@ fn load<T: Real>(
 /// of its inliers.
 ///
 /// # Errors
-/// [`RelativePoseError`], with everything untouched.
+/// [`RelativePoseError`], with everything untouched: as [`relative_pose`], but for the options of its search; and
+/// [`RelativePoseError::Pose`](super::TwoViewError::Pose).
+///
+/// # Degeneracies
+/// What leaves a direction open has no answer: points on a line, a pure rotation, fewer than six inliers. A plane is no
+/// degeneracy of the refinement, but its twin pose is as good: [`relative_pose`] tells both.
+///
+/// # Accuracy
+/// `f32` differs from `f64` by a thousandth of the rotation's standard deviation, by a hundredth in one case of a hundred
+/// (100 points, 0.5 px of noise).
 ///
 /// # Cost
 /// At most 10 passes over the correspondences.
@@ -196,6 +245,32 @@ fn load<T: Real>(
 /// # References
 /// P. Sampson, "Fitting conic sections to very scattered data", 1982; A. Beaton, J. Tukey, "The fitting of power series",
 /// Technometrics, 1974 (the loss).
+///
+/// # Examples
+/// ```
+/// use epipole::estimate::{RelativePoseOptions, RelativePoseStorage, refine_relative_pose};
+/// use epipole::geometry::{CameraModel, Pinhole, Pose};
+/// use epipole::nalgebra::{Point3, Vector3};
+///
+/// let camera = Pinhole::new(500.0_f64, 500.0, 320.0, 240.0)?;
+/// let truth = Pose::new(Vector3::new(1.0, 0.0, 0.0), Vector3::new(0.0, 0.05, 0.0));
+/// let points: [_; 30] = core::array::from_fn(|i| {
+///     let i = i as f64;
+///     Point3::new(3.0 * (1.7 * i).sin(), 2.0 * (2.3 * i).cos(), 7.0 + 2.0 * (0.9 * i).sin())
+/// });
+/// let x1 = points.map(|x| camera.project(&x.coords).unwrap());
+/// let x2 = points.map(|x| camera.project(&(truth * x).coords).unwrap());
+/// // A degree and a tenth of the baseline off.
+/// let start = Pose::new(Vector3::new(1.0, 0.1, 0.0), Vector3::new(0.017, 0.05, 0.0));
+/// let mut storage = RelativePoseStorage::<f64, 32>::new();
+/// let mut options = RelativePoseOptions::default();
+/// options.max_error_px = 20.0; // so that the start has inliers
+/// let refined =
+///     refine_relative_pose(&camera, &camera, &x1, &x2, &start, &options, &mut storage.workspace())?.unwrap();
+/// assert!(refined.pose.rotation.angle_to(&truth.rotation) < 1e-6);
+/// assert!((refined.pose.translation.vector - truth.translation.vector).norm() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn refine_relative_pose<T: Real>(
     camera1: &impl CameraModel<T>,
     camera2: &impl CameraModel<T>,
@@ -206,6 +281,11 @@ pub fn refine_relative_pose<T: Real>(
     workspace: &mut RelativePoseWorkspace<'_, T>,
 ) -> Result<Option<GeneralMotion<T>>, RelativePoseError> {
     check_noise(options.max_error_px, options.sigma_px)?;
+    let t = &pose.translation.vector;
+    let finite = pose.rotation.coords.iter().chain(t.iter()).all(|&x| is_finite(x));
+    if !finite || t.iter().all(|&x| x == T::ZERO) {
+        return Err(RelativePoseError::Pose);
+    }
     let lens = load(camera1, camera2, x1, x2, &Guide::none(), workspace)?;
     Ok(match lens {
         Lens::Rectilinear(units) => refine::<T, PlaneBlock<T>>(units, pose, options, workspace),

@@ -26,6 +26,7 @@ use crate::real::{is_finite, lit, sqrt};
 /// # References
 /// D. C. Brown, "Decentering Distortion of Lenses", Photogrammetric Engineering 32(3), 1966.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BrownConrady<T: Real> {
     pinhole: Pinhole<T>,
     k: [T; 3],

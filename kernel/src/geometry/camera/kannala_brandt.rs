@@ -26,6 +26,7 @@ use crate::real::{abs, atan2, is_finite, lit, max, sin_cos, sqrt};
 /// J. Kannala, S. S. Brandt, "A Generic Camera Model and Calibration Method for Conventional, Wide-Angle, and Fish-Eye
 /// Lenses", IEEE Transactions on Pattern Analysis and Machine Intelligence 28(8), 2006.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct KannalaBrandt<T: Real> {
     pinhole: Pinhole<T>,
     k: [T; 4],

@@ -78,6 +78,7 @@ pub trait CameraModel<T: Real> {
 /// # Ok::<(), epipole::geometry::CameraError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Camera<T: Real> {
     /// No distortion.

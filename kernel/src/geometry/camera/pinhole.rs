@@ -12,6 +12,7 @@ use crate::real::is_finite;
 /// R. Hartley, A. Zisserman, "Multiple View Geometry in Computer Vision", 2nd edition, Cambridge University Press,
 /// 2003, chapter 6.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pinhole<T: Real> {
     fx: T,
     fy: T,
