@@ -265,7 +265,7 @@ fn lenses() {
         camera2: &impl CameraModel<f64>,
         rng: &mut Rng,
     ) -> Option<(f64, f64)> {
-        let truth = epipole::geometry::Pose::new(rng.direction() * 0.8, rng.direction() * 0.15);
+        let truth = Pose::new(rng.direction() * 0.8, rng.direction() * 0.15);
         let (mut x1, mut x2) = (Vec::new(), Vec::new());
         while x1.len() < 150 {
             let point = Point3::new(rng.range(-3.0, 3.0), rng.range(-2.0, 2.0), rng.range(3.0, 9.0));

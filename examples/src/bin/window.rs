@@ -37,9 +37,9 @@ struct Arguments {
     /// Seed of the flight.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Adjust in double precision.
+    /// Adjust in single precision.
     #[arg(long)]
-    f64: bool,
+    f32: bool,
     /// The picture of the path seen from above (SVG).
     #[arg(long, value_name = "FILE", default_value = "out/window.svg")]
     out: PathBuf,
@@ -50,7 +50,7 @@ struct Arguments {
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    let run = if arguments.f64 { run::<f64> } else { run::<f32> };
+    let run = if arguments.f32 { run::<f32> } else { run::<f64> };
     match run(&arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(reason) => {
