@@ -31,8 +31,9 @@ pub struct WideTwoViewStorage<T, const N: usize> {
     inliers: [bool; N],
 }
 
+/// Storage of `$width` numbers a correspondence, and its view as a `$workspace`.
 macro_rules! impl_storage {
-    ($name:ident, $width:literal) => {
+    ($name:ident, $width:literal, $workspace:ident) => {
         impl<T: Real, const N: usize> $name<T, N> {
             /// Empty memory.
             #[must_use]
@@ -42,13 +43,8 @@ macro_rules! impl_storage {
             }
 
             /// The view that estimators take; it does not depend on the capacity's type.
-            pub fn workspace(&mut self) -> TwoViewWorkspace<'_, T> {
-                TwoViewWorkspace {
-                    numbers: self.numbers.as_flattened_mut(),
-                    order: &mut self.order,
-                    inliers: &mut self.inliers,
-                    count: 0,
-                }
+            pub fn workspace(&mut self) -> $workspace<'_, T> {
+                $workspace::from_slices(self.numbers.as_flattened_mut(), &mut self.order, &mut self.inliers)
             }
         }
 
@@ -59,9 +55,10 @@ macro_rules! impl_storage {
         }
     };
 }
+pub(super) use impl_storage;
 
-impl_storage!(TwoViewStorage, 4);
-impl_storage!(WideTwoViewStorage, 18);
+impl_storage!(TwoViewStorage, 4, TwoViewWorkspace);
+impl_storage!(WideTwoViewStorage, 18, TwoViewWorkspace);
 
 /// The caller's memory for a two-view estimation, and after it the inlier mask.
 #[derive(Debug)]

@@ -1,6 +1,7 @@
 //! The memory of an absolute-pose estimation, owned by the caller.
 
 use crate::Real;
+use crate::estimate::workspace::impl_storage;
 use crate::real::lit;
 use crate::refine::blocks::Block;
 use crate::refine::reprojection::{BearingPointBlock, PlanePointBlock};
@@ -32,36 +33,8 @@ pub struct WideAbsolutePoseStorage<T, const N: usize> {
     inliers: [bool; N],
 }
 
-macro_rules! impl_storage {
-    ($name:ident, $width:literal) => {
-        impl<T: Real, const N: usize> $name<T, N> {
-            /// Empty memory.
-            #[must_use]
-            pub fn new() -> Self {
-                const { assert!(N > 0 && N.is_multiple_of(4), "the capacity is a multiple of 4") };
-                Self { numbers: [[lit(0.0); $width]; N], order: [0; N], inliers: [false; N] }
-            }
-
-            /// The view that the estimator takes; it does not depend on the capacity's type.
-            pub fn workspace(&mut self) -> AbsolutePoseWorkspace<'_, T> {
-                AbsolutePoseWorkspace::from_slices(
-                    self.numbers.as_flattened_mut(),
-                    &mut self.order,
-                    &mut self.inliers,
-                )
-            }
-        }
-
-        impl<T: Real, const N: usize> Default for $name<T, N> {
-            fn default() -> Self {
-                Self::new()
-            }
-        }
-    };
-}
-
-impl_storage!(AbsolutePoseStorage, 5);
-impl_storage!(WideAbsolutePoseStorage, 12);
+impl_storage!(AbsolutePoseStorage, 5, AbsolutePoseWorkspace);
+impl_storage!(WideAbsolutePoseStorage, 12, AbsolutePoseWorkspace);
 
 /// The caller's memory for an absolute-pose estimation, and after it the inlier mask.
 #[derive(Debug)]
