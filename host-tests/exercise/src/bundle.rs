@@ -37,6 +37,12 @@ pub(crate) fn window<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
         position.z += lit(8.0);
         *slot = window.add_point(&position).ok();
     }
+    for handle in frames.iter().flatten() {
+        sink.count(FrameHandle::index(FrameHandle::from_bits(FrameHandle::to_bits(*handle))));
+    }
+    for handle in points.iter().flatten() {
+        sink.count(PointHandle::index(PointHandle::from_bits(PointHandle::to_bits(*handle))));
+    }
     for &point in points.iter().flatten() {
         for &frame in frames.iter().flatten() {
             let mut pixel = source.vector2::<T>() * lit::<T>(100.0);

@@ -2,10 +2,11 @@
 
 use epipole::Real;
 use epipole::estimate::{
-    AbsolutePoseOptions, AbsolutePoseStorage, AbsolutePoseVerdict, AbsolutePoseWorkspace, FundamentalOptions,
-    GravityPrior, HomographyOptions, HomographyVerdict, RelativePoseEstimate, RelativePoseOptions,
-    RelativePoseVerdict, TwoViewStorage, TwoViewWorkspace, WideAbsolutePoseStorage, WideTwoViewStorage,
-    absolute_pose, absolute_pose_guided, fundamental, fundamental_guided, homography, homography_guided,
+    AbsolutePoseEstimate, AbsolutePoseOptions, AbsolutePoseStorage, AbsolutePoseVerdict,
+    AbsolutePoseWorkspace, FundamentalEstimate, FundamentalOptions, GravityPrior, HomographyEstimate,
+    HomographyOptions, HomographyVerdict, RelativePoseEstimate, RelativePoseOptions, RelativePoseVerdict,
+    TwoViewStorage, TwoViewWorkspace, WideAbsolutePoseStorage, WideTwoViewStorage, absolute_pose,
+    absolute_pose_guided, fundamental, fundamental_guided, homography, homography_guided,
     refine_relative_pose, relative_pose, relative_pose_guided,
 };
 use epipole::geometry::{Camera, CameraModel};
@@ -149,7 +150,7 @@ pub(crate) fn two_view_matrices<T: Real>(source: &mut Source<'_>, sink: &mut Sin
     .flatten()
     {
         sink.finite(&[estimate.noise_px]);
-        if let Some(f) = estimate.fundamental() {
+        if let Some(f) = FundamentalEstimate::fundamental(estimate) {
             sink.finite(&f.0);
         }
     }
@@ -168,7 +169,7 @@ pub(crate) fn two_view_matrices<T: Real>(source: &mut Source<'_>, sink: &mut Sin
             sink.finite(found.corners.iter().flatten());
             sink.finite(found.covariance.iter().flatten());
         }
-        sink.flag(estimate.homography().is_some());
+        sink.flag(HomographyEstimate::homography(estimate).is_some());
     }
     for &inlier in workspace.inliers() {
         sink.flag(inlier);
@@ -215,7 +216,7 @@ fn pose_of_points<T: Real>(
     .flatten()
     {
         sink.finite(&[estimate.noise_px]);
-        sink.flag(estimate.pose().is_some());
+        sink.flag(AbsolutePoseEstimate::pose(estimate).is_some());
         let found: &[_] = match &estimate.verdict {
             AbsolutePoseVerdict::Pose(pose) => core::slice::from_ref(pose),
             AbsolutePoseVerdict::PlanarAmbiguity(poses) => poses,

@@ -5,8 +5,8 @@ use epipole::geometry::triangulation::{
     Triangulation, View, ViewPair, depth_sigma, point_covariance, refine_point, triangulate_dlt,
 };
 use epipole::geometry::{
-    BrownConrady, Camera, CameraModel, Essential, Fundamental, Homography, KannalaBrandt, Pinhole, Pose,
-    pose as p, residual,
+    BrownConrady, Camera, CameraModel, Essential, Fundamental, Homography, KannalaBrandt, Pinhole,
+    PlaneMotion, Pose, pose as p, residual,
 };
 use epipole::nalgebra::{Vector3, Vector6};
 use epipole::{Real, real::lit};
@@ -54,6 +54,9 @@ fn camera<T: Real>(source: &mut Source<'_>) -> Option<Pinhole<T>> {
 
 fn model<T: Real>(camera: &impl CameraModel<T>, source: &mut Source<'_>, sink: &mut Sink) {
     sink.finite(&[camera.focal()]);
+    if let Some((fx, fy)) = camera.rectilinear() {
+        sink.finite(&[fx, fy]);
+    }
     let point = source.vector3::<T>();
     if let Some(pixel) = camera.project(&point) {
         sink.finite(&pixel);
@@ -250,7 +253,7 @@ pub(crate) fn homography<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
     for motion in h.motions().iter().chain(&motions) {
         sink.finite_pose(&motion.pose);
         sink.finite(&motion.normal);
-        sink.numbers(&motion.homography().0);
+        sink.numbers(&PlaneMotion::homography(motion).0);
     }
 }
 

@@ -1,5 +1,6 @@
 //! `epipole::real` and `epipole::linalg`.
 
+use epipole::linalg::poly::RealRoots10;
 use epipole::linalg::{self, Ldlt, Lu, RowQr};
 use epipole::{Real, real};
 
@@ -10,6 +11,7 @@ pub(crate) fn scalar<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
     let (sin, cos) = real::sin_cos(x);
     sink.numbers(&[sin, cos, real::sqrt(x), real::atan2(y, x), real::ln(x), real::exp(x), real::cbrt(x)]);
     sink.numbers(&[real::abs(x), real::max(x, y), real::min(x, y), real::from_u32(source.byte().into())]);
+    sink.numbers(&[<T as Real>::from_f64(0.1), <T as Real>::from_u32(7)]);
     sink.flag(real::is_finite(x));
 }
 
@@ -81,7 +83,7 @@ pub(crate) fn polynomials<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
     sink.count(roots.len());
     sink.numbers(roots.iter().flat_map(|chart| chart.as_slice()));
     let roots = linalg::poly::real_roots_10(&source.array::<T, 11>(), T::EPSILON);
-    sink.numbers(roots.as_slice());
+    sink.numbers(RealRoots10::as_slice(&roots));
     let worst = roots.least_determined();
     sink.numbers(&[worst.x, worst.spread]);
     let roots = linalg::cubic_roots(&source.array::<T, 4>());

@@ -123,7 +123,9 @@ pub(crate) fn engine<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
     };
     let guide = Guide::<T>::none();
     sink.flag(guide.scores.is_none());
-    let consensus = ransac(&Location(source.array()), &options, None, 3, Some(&mut keep_going));
+    let location = Location(source.array());
+    sink.flag(location.reject(&source.scalar()));
+    let consensus = ransac(&location, &options, None, 3, Some(&mut keep_going));
     for (model, score) in consensus.models.iter().flatten() {
         sink.number(*model);
         sink.number(score.cost);

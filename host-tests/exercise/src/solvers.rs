@@ -1,8 +1,8 @@
 //! `epipole::solvers`.
 
-use epipole::Real;
 use epipole::nalgebra::Vector3;
 use epipole::solvers as s;
+use epipole::{Real, Solutions};
 
 use crate::{Sink, Source};
 
@@ -22,7 +22,7 @@ pub(crate) fn relpose_5pt<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
     let (x1, x2) = correspondences::<T, 5>(source);
     let solutions = s::relpose_5pt(&x1, &x2);
     sink.count(solutions.len());
-    for e in &solutions {
+    for e in Solutions::as_slice(&solutions) {
         sink.finite(&e.0);
     }
     for pose in &s::relpose_5pt_poses(&x1, &x2) {

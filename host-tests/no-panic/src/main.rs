@@ -1,4 +1,4 @@
-//! Links only if no public function of `epipole` has a panic path left after optimisation, in either scalar: the panic
+//! Links only if no public function of `epipole`, and no function of its C interface, has a panic path left after optimisation, in either scalar: the panic
 //! handler calls a function that exists nowhere. It has no allocator either, so nothing in it allocates.
 #![no_std]
 #![no_main]
@@ -6,6 +6,7 @@
 use core::hint::black_box;
 use core::panic::PanicInfo;
 
+use epipole_capi as _;
 use epipole_exercise::{CAPABILITIES, Sink, Source};
 
 unsafe extern "C" {
@@ -13,16 +14,19 @@ unsafe extern "C" {
     fn a_panic_path_is_left() -> !;
 }
 
+include!(concat!(env!("OUT_DIR"), "/c_functions.rs"));
+
 #[panic_handler]
 fn panic(_: &PanicInfo<'_>) -> ! {
     // SAFETY: an image with this call does not link, so it never runs.
     unsafe { a_panic_path_is_left() }
 }
 
-/// The entry point of the image: every capability, in both scalars.
+/// The entry point of the image: every capability in both scalars, and every C function as a root.
 #[unsafe(no_mangle)]
 pub extern "C" fn _start() -> u64 {
     let mut sink = Sink::default();
+    black_box(&C_FUNCTIONS);
     let mut source = Source::seeded(black_box(1));
     // Through a pointer that the compiler cannot see through, so that all of the table stays.
     for capability in black_box(CAPABILITIES) {
