@@ -32,13 +32,12 @@ pub fn trial<R>(mut call: impl FnMut() -> R, error: impl FnOnce(&R) -> f64) -> T
     Trial { error: error(&answer), cost, stack }
 }
 
-/// Measures the problems, and prints the line. A problem is solved where its error is below `limit`.
+/// Measures the problems, and prints the line: the entry point, the set of problems, and what they cost. A problem is solved where its error is below `limit`.
 #[inline(never)]
-pub fn row(name: &str, problems: Range<u32>, limit: f64, mut run: impl FnMut(u32) -> Trial) {
+pub fn row(name: &str, set: &str, problems: Range<u32>, limit: f64, mut run: impl FnMut(u32) -> Trial) {
     // SAFETY: the only reference, for the time of this function.
     let (costs, errors) = unsafe { &mut *SAMPLES.0.get() };
     let (mut used, mut sum, mut solved, mut none, mut stack) = (0usize, 0u64, 0u32, 0u32, 0);
-    let (from, to) = (problems.start, problems.end);
     for k in problems {
         let trial = run(k);
         let (Some(cost), Some(error)) = (costs.get_mut(used), errors.get_mut(used)) else { break };
@@ -54,7 +53,7 @@ pub fn row(name: &str, problems: Range<u32>, limit: f64, mut run: impl FnMut(u32
     costs.sort_unstable();
     errors.sort_unstable_by(f32::total_cmp);
     println!(
-        "{name} | {from}..{to} | {} | {} | {} | {:.2} | {none} | {:.2e} | {stack}",
+        "{name} | {set} | {} | {} | {} | {:.2} | {none} | {:.2e} | {stack}",
         (sum + used as u64 / 2) / used as u64,
         costs[(used * 99).div_ceil(100) - 1],
         costs[used - 1],

@@ -12,12 +12,9 @@ const SCALARS: usize = scalars_len(FRAMES);
 pub fn run() {
     for iterations in [1, 5] {
         let mut storage = WindowStorage::<f32, FRAMES, POINTS, { FRAMES * POINTS }, SCALARS>::new();
-        let name = if iterations == 1 {
-            "bundle::Window::optimise, 1 iteration"
-        } else {
-            "bundle::Window::optimise, 5 iterations"
-        };
-        row(name, 0..8, 1.0, |k| {
+        let name =
+            if iterations == 1 { "window_optimise, 1 iteration" } else { "window_optimise, 5 iterations" };
+        row(name, "flight", 0..8, 1.0, |k| {
             let mut window = storage.window();
             window.clear();
             let flight = Flight { seed: u64::from(k) };
