@@ -15,3 +15,17 @@ pub mod texture;
 pub mod track;
 pub mod two_view;
 pub mod window;
+
+use std::error::Error;
+use std::process::ExitCode;
+
+/// How a program ends: an error is told on the standard error stream.
+pub fn exit_code(result: Result<(), Box<dyn Error>>) -> ExitCode {
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(reason) => {
+            eprintln!("error: {reason}");
+            ExitCode::FAILURE
+        }
+    }
+}

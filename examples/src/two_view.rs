@@ -9,14 +9,32 @@ use epipole::geometry::{Camera, CameraModel, Pose};
 use epipole::nalgebra::{Isometry3, Matrix3, Quaternion, UnitQuaternion, Vector2, Vector3};
 use epipole::real::lit;
 
+use crate::features::FeatureOptions;
 use crate::lens::{CameraParameters, numbers};
 use crate::matching::Match;
 
-/// What a user may choose of the estimation.
-#[derive(Clone, Copy, Debug)]
+/// What a user may choose of features and estimation, on the command line.
+#[derive(clap::Args, Clone, Copy, Debug)]
 pub struct Settings {
+    /// Largest Sampson error of an inlier, in pixels.
+    #[arg(long = "threshold", value_name = "PX", default_value_t = 1.0, allow_negative_numbers = true)]
     pub threshold_px: f64,
+    /// Most features an image.
+    #[arg(long, value_name = "N", default_value_t = FeatureOptions::default().max_features)]
+    pub features: usize,
+    /// Seed of the robust estimation.
+    #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+    /// Estimate in single precision.
+    #[arg(long)]
+    pub f32: bool,
+}
+
+impl Settings {
+    /// Options of the feature detector.
+    pub fn feature_options(&self) -> FeatureOptions {
+        FeatureOptions { max_features: self.features, ..Default::default() }
+    }
 }
 
 /// The pose between two views and what supports it.

@@ -36,7 +36,7 @@
 //! rounded square root; the few other functions come from one software library, through [`real`] alone.
 //!
 //! # Features
-//! `defmt` adds `Format` to errors and reports. It changes no number.
+//! `defmt` adds `Format` to errors, reports, options and cameras. It changes no number.
 
 pub use nalgebra;
 

@@ -12,6 +12,7 @@ use epipole::geometry::{CameraModel, Pinhole, Pose};
 use epipole::nalgebra::{Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 use epipole::solvers::{PlanarTargetPose, abspose_planar};
 use epipole_examples::canvas::{Paint, disc, stroke, text};
+use epipole_examples::exit_code;
 use epipole_examples::noise::{Rng, fractal};
 use image::{ImageReader, Rgb, RgbImage};
 
@@ -40,13 +41,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(reason) => {
-            eprintln!("error: {reason}");
-            ExitCode::FAILURE
-        }
-    }
+    exit_code(run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {

@@ -12,8 +12,9 @@ use std::time::Instant;
 use clap::Parser;
 use epipole::nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
 use epipole_examples::align::refine_matches;
+use epipole_examples::exit_code;
 use epipole_examples::export::write_matches;
-use epipole_examples::features::{FeatureOptions, Features, detect};
+use epipole_examples::features::{Features, detect};
 use epipole_examples::lens::{CameraParameters, Lens};
 use epipole_examples::matching::{Match, match_features};
 use epipole_examples::track::draw_track;
@@ -25,18 +26,8 @@ struct Arguments {
     /// Folder with calib.txt (first line: a 3x4 projection matrix K [I | 0], row-major), the frames in image_l or
     /// image_0, and, to compare with, poses.txt (a 3x4 camera-to-world matrix a line, row-major).
     folder: PathBuf,
-    /// Largest Sampson error of an inlier, in pixels.
-    #[arg(long, value_name = "PX", default_value_t = 1.0, allow_negative_numbers = true)]
-    threshold: f64,
-    /// Most features a frame.
-    #[arg(long, value_name = "N", default_value_t = FeatureOptions::default().max_features)]
-    features: usize,
-    /// Seed of the robust estimation.
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
-    /// Estimate in single precision.
-    #[arg(long)]
-    f32: bool,
+    #[command(flatten)]
+    settings: Settings,
     /// Use only the first N frames.
     #[arg(long, value_name = "N")]
     frames: Option<usize>,
@@ -49,13 +40,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(reason) => {
-            eprintln!("error: {reason}");
-            ExitCode::FAILURE
-        }
-    }
+    exit_code(run(&Arguments::parse()))
 }
 
 /// A frame and what was found in it.
@@ -80,8 +65,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     if let Some(out) = &arguments.matches {
         fs::create_dir_all(out).map_err(|e| format!("{}: {e}", out.display()))?;
     }
-    let settings = Settings { threshold_px: arguments.threshold, seed: arguments.seed };
-    let options = FeatureOptions { max_features: arguments.features, ..Default::default() };
+    let settings = &arguments.settings;
+    let options = arguments.settings.feature_options();
     let step = |k: usize| truth.as_ref().map(|poses| poses[k + 1].inverse() * poses[k]);
 
     // World to camera of each frame; the world is the first camera.
@@ -105,10 +90,10 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         let mut matches = match_features(&previous.features, &frame.features);
         refine_matches(&previous.features, &frame.features, &mut matches);
         let start = Instant::now();
-        let found = if arguments.f32 {
-            estimate::<f32>(&[camera; 2], &matches, &settings)
+        let found = if settings.f32 {
+            estimate::<f32>(&[camera; 2], &matches, settings)
         } else {
-            estimate::<f64>(&[camera; 2], &matches, &settings)
+            estimate::<f64>(&[camera; 2], &matches, settings)
         };
         let milliseconds = 1e3 * start.elapsed().as_secs_f64();
         print!("{:7}-{:7}  {:7}", previous.name, frame.name, matches.len());

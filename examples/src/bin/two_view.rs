@@ -10,8 +10,9 @@ use std::time::Instant;
 
 use clap::Parser;
 use epipole::nalgebra::Isometry3;
+use epipole_examples::exit_code;
 use epipole_examples::export::{View, scene_points, write_colmap, write_matches, write_ply};
-use epipole_examples::features::{FeatureOptions, detect};
+use epipole_examples::features::detect;
 use epipole_examples::lens::{CameraParameters, FisheyeCoefficients, Lens};
 use epipole_examples::matching::{Match, match_features};
 use epipole_examples::two_view::{
@@ -42,18 +43,8 @@ struct Arguments {
     /// The true pose, to compare with: nine numbers of R row-major, three of t.
     #[arg(long, value_name = "NUMBERS", allow_hyphen_values = true, requires = "camera")]
     truth: Option<Truth>,
-    /// Largest Sampson error of an inlier, in pixels.
-    #[arg(long, value_name = "PX", default_value_t = 1.0, allow_negative_numbers = true)]
-    threshold: f64,
-    /// Most features an image.
-    #[arg(long, value_name = "N", default_value_t = FeatureOptions::default().max_features)]
-    features: usize,
-    /// Seed of the robust estimation.
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
-    /// Estimate in single precision.
-    #[arg(long)]
-    f32: bool,
+    #[command(flatten)]
+    settings: Settings,
     /// The picture of matches and epipolar lines (PNG or JPEG).
     #[arg(long, value_name = "FILE", default_value = "out/two_view.png")]
     out: PathBuf,
@@ -84,13 +75,7 @@ struct Input {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(reason) => {
-            eprintln!("error: {reason}");
-            ExitCode::FAILURE
-        }
-    }
+    exit_code(run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
@@ -104,7 +89,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     println!("{} and {}, {w} x {h}, {verb} in {:.2} s", input.names[0], input.names[1], seconds(start));
 
     let start = Instant::now();
-    let options = FeatureOptions { max_features: arguments.features, ..Default::default() };
+    let options = arguments.settings.feature_options();
     let features =
         [0, 1].map(|i| detect(&DynamicImage::ImageRgb8(input.images[i].clone()).into_luma8(), &options));
     let mut matches = match_features(&features[0], &features[1]);
@@ -124,11 +109,11 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
             .map_err(|e| format!("{}: {e}", file.display()))?;
     }
     let start = Instant::now();
-    let settings = Settings { threshold_px: arguments.threshold, seed: arguments.seed };
-    let found = if arguments.f32 {
-        estimate::<f32>(&input.cameras, &matches, &settings)
+    let settings = &arguments.settings;
+    let found = if settings.f32 {
+        estimate::<f32>(&input.cameras, &matches, settings)
     } else {
-        estimate::<f64>(&input.cameras, &matches, &settings)
+        estimate::<f64>(&input.cameras, &matches, settings)
     }?;
     let milliseconds = 1e3 * seconds(start);
     let errors = print_pose(&found, matches.len(), milliseconds, input.truth);

@@ -9,6 +9,7 @@ use epipole::Real;
 use epipole::bundle::BundleOptions;
 use epipole::real::lit;
 use epipole::robust::loss::Loss;
+use epipole_examples::exit_code;
 use epipole_examples::window::flight::fly;
 use epipole_examples::window::problem::Problem;
 use epipole_examples::window::{HeapWindow, cast_pose, centre, draw_paths};
@@ -51,13 +52,7 @@ struct Arguments {
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let run = if arguments.f32 { run::<f32> } else { run::<f64> };
-    match run(&arguments) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(reason) => {
-            eprintln!("error: {reason}");
-            ExitCode::FAILURE
-        }
-    }
+    exit_code(run(&arguments))
 }
 
 fn run<T: Real>(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
