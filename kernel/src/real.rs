@@ -17,6 +17,8 @@ mod sealed {
         fn raw_exp(self) -> Self;
         fn raw_cbrt(self) -> Self;
         fn raw_is_finite(self) -> bool;
+        fn raw_abs(self) -> Self;
+        fn raw_copysign(self, sign: Self) -> Self;
     }
 }
 
@@ -79,6 +81,14 @@ macro_rules! impl_real {
             #[inline(always)]
             fn raw_is_finite(self) -> bool {
                 $t::is_finite(self)
+            }
+            #[inline(always)]
+            fn raw_abs(self) -> Self {
+                $t::abs(self)
+            }
+            #[inline(always)]
+            fn raw_copysign(self, sign: Self) -> Self {
+                $t::copysign(self, sign)
             }
         }
 
@@ -162,10 +172,16 @@ pub fn cbrt<T: Real>(x: T) -> T {
     x.raw_cbrt()
 }
 
-/// The absolute value.
+/// The absolute value: the sign bit cleared, without a comparison.
 #[inline(always)]
 pub fn abs<T: Real>(x: T) -> T {
-    if x < T::ZERO { -x } else { x }
+    x.raw_abs()
+}
+
+/// The magnitude of `x` with the sign of `sign`, without a comparison.
+#[inline(always)]
+pub(crate) fn copysign<T: Real>(x: T, sign: T) -> T {
+    x.raw_copysign(sign)
 }
 
 /// The larger of two numbers; `b` where they do not compare.

@@ -94,11 +94,8 @@ impl<T: Real> ObjectSpace<T> {
         let mut damping = lit::<T>(1e-3);
         for _ in 0..MAX_STEPS {
             // d (Exp(w) R) = [e_k]x R
-            let turned = [0, 1, 2].map(|k| {
-                let mut axis = Vector3::zeros();
-                axis[k] = T::ONE;
-                super::pose::skew(&axis) * best
-            });
+            let turned = [Vector3::x(), Vector3::y(), Vector3::z()]
+                .map(|axis: Vector3<T>| super::pose::skew(&axis) * best);
             let applied = self.apply(&best);
             let mut gradient = Vector3::zeros();
             let mut hessian = Matrix3::zeros();

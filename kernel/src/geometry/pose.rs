@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix3, Matrix3x2, Quaternion, Translation3, UnitQuat
 
 use crate::Real;
 use crate::linalg::{Svd3, svd3};
-use crate::real::{abs, atan2, is_finite, lit, max, sin_cos, sqrt};
+use crate::real::{abs, atan2, copysign, is_finite, lit, max, sin_cos, sqrt};
 
 /// A pose maps into the camera: `x_cam = R X + t`. Of two views, the pose of view 2 in the frame of view 1:
 /// `X2 = R X1 + t`, |t| = 1 where scale is unobservable.
@@ -16,35 +16,29 @@ pub fn from_parts<T: Real>(r: &Matrix3<T>, t: &Vector3<T>) -> Pose<T> {
     Pose::from_parts(Translation3::from(*t), quaternion_from_matrix(r))
 }
 
-/// The unit quaternion of a rotation matrix, by the largest of its four components (Shepperd 1978).
+/// The unit quaternion of a rotation matrix, with w >= 0.
+///
 /// `r` must be a rotation to within rounding; it is not checked, and the result is normalised.
 #[must_use]
 pub fn quaternion_from_matrix<T: Real>(r: &Matrix3<T>) -> UnitQuaternion<T> {
     let (a, b, c) = (r[(0, 0)], r[(1, 1)], r[(2, 2)]);
-    let one = T::ONE;
-    let (w, x, y, z);
-    if a + b + c > T::ZERO {
-        w = one + a + b + c;
-        x = r[(2, 1)] - r[(1, 2)];
-        y = r[(0, 2)] - r[(2, 0)];
-        z = r[(1, 0)] - r[(0, 1)];
-    } else if a > b && a > c {
-        w = r[(2, 1)] - r[(1, 2)];
-        x = one + a - b - c;
-        y = r[(0, 1)] + r[(1, 0)];
-        z = r[(0, 2)] + r[(2, 0)];
-    } else if b > c {
-        w = r[(0, 2)] - r[(2, 0)];
-        x = r[(0, 1)] + r[(1, 0)];
-        y = one + b - a - c;
-        z = r[(1, 2)] + r[(2, 1)];
-    } else {
-        w = r[(1, 0)] - r[(0, 1)];
-        x = r[(0, 2)] + r[(2, 0)];
-        y = r[(1, 2)] + r[(2, 1)];
-        z = one + c - a - b;
-    }
-    let scale = one / sqrt(w * w + x * x + y * y + z * z);
+    let (wx, wy, wz) = (r[(2, 1)] - r[(1, 2)], r[(0, 2)] - r[(2, 0)], r[(1, 0)] - r[(0, 1)]);
+    let (xy, xz, yz) = (r[(0, 1)] + r[(1, 0)], r[(0, 2)] + r[(2, 0)], r[(1, 2)] + r[(2, 1)]);
+    let (plus, minus) = (T::ONE + a, T::ONE - a);
+    let (sum, difference) = (b + c, b - c);
+    // The columns of 4 q q' are q times 4 q_k. With the signs that let them add up their sum is q times four times
+    // |w| + |x| + |y| + |z|, at least 4: nothing cancels, and no branch asks which component is large.
+    let column_w = [plus + sum, wx, wy, wz];
+    let column_x = [wx, plus - sum, xy, xz];
+    let column_y = [wy, xy, minus + difference, yz];
+    let column_z = [wz, xz, yz, minus - difference];
+    let add = |a: &[T; 4], b: &[T; 4], sign: T| {
+        let s = copysign(T::ONE, sign);
+        [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2], a[3] + s * b[3]]
+    };
+    let (u, v) = (add(&column_w, &column_x, wx), add(&column_y, &column_z, yz));
+    let [w, x, y, z] = add(&u, &v, (u[0] * v[0] + u[1] * v[1]) + (u[2] * v[2] + u[3] * v[3]));
+    let scale = T::ONE / sqrt(w * w + x * x + y * y + z * z);
     UnitQuaternion::new_unchecked(Quaternion::new(w * scale, x * scale, y * scale, z * scale))
 }
 
@@ -340,14 +334,9 @@ pub fn upright<T: Real>(gravity: &Vector3<T>) -> Option<Matrix3<T>> {
 /// `z' = c z - s x`. `(c, s)` must be a unit vector; it is not checked.
 #[inline]
 pub(crate) fn rotation_about_y<T: Real>(c: T, s: T) -> UnitQuaternion<T> {
-    // The half angle's larger component by a square root, the other from the sine.
-    let (w, y) = if c > T::ZERO {
-        let w = sqrt((T::ONE + c) * T::HALF);
-        (w, s * T::HALF / w)
-    } else {
-        let y = sqrt((T::ONE - c) * T::HALF);
-        let y = if s < T::ZERO { -y } else { y };
-        (s * T::HALF / y, y)
-    };
+    // (1 + c, s) and (s, 1 - c) are along the half angle's (cos, sin): added with the signs that let them add up.
+    let (w, y) = (T::ONE + c + abs(s), s + copysign(T::ONE - c, s));
+    let scale = T::ONE / sqrt(w * w + y * y);
+    let (w, y) = (w * scale, y * scale);
     UnitQuaternion::new_unchecked(Quaternion::new(w, T::ZERO, y, T::ZERO))
 }

@@ -7,7 +7,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::Real;
-use crate::real::{abs, lit, max, min, sqrt};
+use crate::real::{abs, copysign, lit, max, min, sqrt};
 
 /// Newton steps allowed for a root; five are usual, a start far from a triple root gains a factor 2/3 a step.
 const MAX_STEPS: usize = 40;
@@ -27,15 +27,13 @@ pub(crate) fn real_root_of_cubic<T: Real>(c2: T, c1: T, c0: T) -> T {
     let centre = -c2 * lit::<T>(1.0 / 3.0);
     let p = centre * centre - c1 * lit::<T>(1.0 / 3.0);
     let q = value(centre);
-    let size = abs(q);
-    let t = if p > T::ZERO {
-        let extremum = sqrt(p);
-        extremum + sqrt((size + T::TWO * p * extremum) / (three * extremum))
-    } else {
-        let p = max(-three * p, T::EPSILON * (T::ONE + c2 * c2));
-        if size * size < p * p * p { size / p } else { sqrt(size / sqrt(p)) }
-    };
-    let mut x = if q > T::ZERO { centre - t } else { centre + t };
+    // Beyond the root: for p > 0 the root of the parabola that touches at the extremum, else (mean inequality)
+    // t^3 - 3 p t >= 2 sqrt(-3 p) t^2 > 3 sqrt(-p) t^2. One formula for both, without a branch.
+    let size = abs(p);
+    let extremum = sqrt(max(size, T::EPSILON * (T::ONE + c2 * c2)));
+    let above = if p > T::ZERO { extremum } else { T::ZERO };
+    let t = above + sqrt((abs(q) / extremum + (size + p)) * lit::<T>(1.0 / 3.0));
+    let mut x = centre - copysign(t, q);
     let step = |x: T| {
         let f = value(x);
         let half_curvature = three * x + c2;
@@ -63,13 +61,13 @@ pub(crate) fn lines_of_conic<T: Real>(c: &Matrix3<T>) -> [Vector3<T>; 2] {
     let (c00, c01, c02) = (c[(0, 0)], c[(0, 1)], c[(0, 2)]);
     let (c11, c12, c22) = (c[(1, 1)], c[(1, 2)], c[(2, 2)]);
     // The adjugate is -v v' with v = p x q (up to a factor); the first entry of v is not needed, and of the others the
-    // larger gives the smaller without cancellation. An index instead of a branch: either order is as likely.
+    // larger gives the smaller without cancellation.
     let a11 = c02 * c02 - c00 * c22;
     let a22 = c01 * c01 - c00 * c11;
     let root = sqrt(max(max(a11, a22), T::MIN_POSITIVE));
-    let v = [root, (c12 * c00 - c01 * c02) / root];
-    let second = usize::from(a22 > a11);
-    let (v1, v2) = (v[second], v[1 - second]);
+    let other = (c12 * c00 - c01 * c02) / root;
+    let v1 = if a22 > a11 { other } else { root };
+    let v2 = if a11 >= a22 { other } else { root };
     // c + [v]x = 2 q p': rank one, its first row and first column are the lines.
     [Vector3::new(c00, c01 - v2, c02 + v1), Vector3::new(c00, c01 + v2, c02 - v1)]
 }

@@ -124,10 +124,10 @@ fn sorted<T: Real>(roots: Solutions<T, 3>) -> [T; 3] {
     for (slot, &root) in x.iter_mut().zip(&roots) {
         *slot = root;
     }
-    for (i, j) in [(0, 1), (1, 2), (0, 1)] {
-        if x[i] > x[j] {
-            x.swap(i, j);
-        }
-    }
-    x
+    let in_order = |a: T, b: T| if a > b { (b, a) } else { (a, b) };
+    let [a, b, c] = x;
+    let (a, b) = in_order(a, b);
+    let (b, c) = in_order(b, c);
+    let (a, b) = in_order(a, b);
+    [a, b, c]
 }

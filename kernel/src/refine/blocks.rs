@@ -228,8 +228,10 @@ impl<T: Real> EpipolarBlock<T> for BearingBlock<T> {
 
     fn mispaired(&self, other: &Self) -> Self {
         let mut block = *other;
-        for k in [0, 1, 2, 6, 7, 8, 9, 10, 11] {
-            block[k] = self[k];
+        for (k, (own, value)) in block.iter_mut().zip(self).enumerate() {
+            if !(3..6).contains(&k) {
+                *own = *value;
+            }
         }
         block
     }

@@ -95,10 +95,11 @@ pub fn absolute_orientation_with_scale_npt<T: Real>(
     b: &[Vector3<T>],
 ) -> Result<Option<Similarity3<T>>, InputError> {
     check(a, b, 3)?;
-    Ok(align(a, b).filter(|fit| fit.scale > T::ZERO && fit.scale <= T::MAX).and_then(|fit| {
+    Ok(align(a, b).and_then(|fit| {
         let t = fit.mean_b - fit.rotation * fit.mean_a * fit.scale;
         let pose = finite(Pose::from_parts(Translation3::from(t), fit.rotation))?;
-        Some(Similarity3::from_isometry(pose, fit.scale))
+        let scale = fit.scale;
+        (scale > T::ZERO && scale <= T::MAX).then(|| Similarity3::from_isometry(pose, scale))
     }))
 }
 

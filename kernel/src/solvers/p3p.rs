@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::geometry::{Pose, pose};
 use crate::linalg::conic::{lines_of_conic, real_root_of_cubic};
-use crate::real::{abs, lit, max, min, sqrt};
+use crate::real::{abs, copysign, lit, max, min, sqrt};
 use crate::{Real, Solutions};
 
 /// Newton steps on the three distances.
@@ -121,7 +121,7 @@ pub fn p3p<T: Real>(bearings: &[Vector3<T>; 3], points: &[Vector3<T>; 3]) -> Sol
         // A double root may fall on either side of zero by rounding.
         let rounding = (square + abs(product)) * T::EPSILON * lit::<T>(64.0);
         let root = sqrt(max(discriminant, min(discriminant + rounding, T::ZERO)));
-        let q = if q1 > T::ZERO { -(q1 + root) } else { root - q1 };
+        let q = -(q1 + copysign(root, q1));
         let inverse = -T::ONE / l0;
         let (w1, w2) = (l1 * inverse, l2 * inverse);
         // d1 : d2

@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Translation3, Vector3};
 use crate::geometry::Pose;
 use crate::geometry::pose::rotation_about_y;
 use crate::linalg::conic::{lines_of_conic, real_root_of_cubic};
-use crate::real::{abs, lit, max, min, sqrt};
+use crate::real::{abs, copysign, lit, max, min, sqrt};
 use crate::{Real, Solutions};
 
 /// The up to four relative poses of three correspondences, if both frames have the vertical as their y axis.
@@ -119,47 +119,55 @@ pub fn relpose_upright_3pt<T: Real>(x1: &[Vector3<T>; 3], x2: &[Vector3<T>; 3]) 
 }
 
 /// The pose of the rotation by a root of the determinant; `None` where a point is behind a camera.
-#[inline]
+#[inline(always)]
 fn pose_of_angle<T: Real>(c: T, s: T, x1: &[Vector3<T>; 3], x2: &[Vector3<T>; 3]) -> Option<Pose<T>> {
     let turn = |v: &Vector3<T>| Vector3::new(c * v.x + s * v.z, v.y, c * v.z - s * v.x);
-    let (y0, y1, y2) = (turn(&x1[0]), turn(&x1[1]), turn(&x1[2]));
-    let (n0, n1, n2) = (y0.cross(&x2[0]), y1.cross(&x2[1]), y2.cross(&x2[2]));
-    let [z0, z1, z2] = x2;
-    let pose =
-        |t: Option<Vector3<T>>| t.map(|t| Pose::from_parts(Translation3::from(t), rotation_about_y(c, s)));
+    let ([a0, a1, a2], [z0, z1, z2]) = (x1, x2);
+    let (y0, y1) = (turn(a0), turn(a1));
+    let (n0, n1) = (y0.cross(z0), y1.cross(z1));
     // Of the three planes two make a wide enough angle.
-    let wide = |n0: &Vector3<T>, n1: &Vector3<T>| {
-        let t = n0.cross(n1);
-        (t.norm_squared() > lit::<T>(0.05) * n0.norm_squared() * n1.norm_squared()).then_some(t)
+    let wide = |t: &Vector3<T>, n0: &Vector3<T>, n1: &Vector3<T>| {
+        t.norm_squared() > lit::<T>(0.05) * n0.norm_squared() * n1.norm_squared()
     };
-    if let Some(t) = wide(&n0, &n1) {
-        return pose(in_front(t, [&y0, z0, &n0], [&y1, z1, &n1], [&y2, z2, &n2]));
-    }
-    if let Some(t) = wide(&n1, &n2) {
-        return pose(in_front(t, [&y1, z1, &n1], [&y2, z2, &n2], [&y0, z0, &n0]));
-    }
-    pose(in_front(n2.cross(&n0), [&y2, z2, &n2], [&y0, z0, &n0], [&y1, z1, &n1]))
+    let t01 = n0.cross(&n1);
+    let t = if wide(&t01, &n0, &n1) {
+        in_front(t01, [&y0, z0, &n0], [&y1, z1, &n1], &|| turn(a2), z2)?
+    } else {
+        let y2 = turn(a2);
+        let n2 = y2.cross(z2);
+        let t12 = n1.cross(&n2);
+        if wide(&t12, &n1, &n2) {
+            in_front(t12, [&y1, z1, &n1], [&y2, z2, &n2], &|| y0, z0)?
+        } else {
+            in_front(n2.cross(&n0), [&y2, z2, &n2], [&y0, z0, &n0], &|| y1, z1)?
+        }
+    };
+    Some(Pose::from_parts(Translation3::from(t), rotation_about_y(c, s)))
 }
 
-/// The unit translation `t = +-n0 x n1` that has three points in front, each given by its turned first bearing `y`, its
-/// second `z` and the normal `n = y x z`: `d1 n = z x t`, `d2 n = y x t`.
+/// The unit translation `t = +-n0 x n1` that has three points in front, two of them given by the turned first bearing `y`,
+/// the second `z` and the normal `n = y x z`.
 #[inline(always)]
 fn in_front<T: Real>(
     t: Vector3<T>,
     [y0, z0, n0]: [&Vector3<T>; 3],
     [y1, z1, n1]: [&Vector3<T>; 3],
-    [y2, z2, n2]: [&Vector3<T>; 3],
+    y2: &impl Fn() -> Vector3<T>,
+    z2: &Vector3<T>,
 ) -> Option<Vector3<T>> {
-    // z0 x (n0 x n1) = n0 (z0 n1): the signs of the first two points without t
+    // `d1 n = z x t`, `d2 n = y x t`, and z0 x (n0 x n1) = n0 (z0 n1): the signs of the first two points without t
     let (a, b) = (z0.dot(n1), y0.dot(n1));
     let (c, d) = (z1.dot(n0), y1.dot(n0));
-    let sign = if a > T::ZERO { T::ONE } else { -T::ONE };
-    if !((b * sign > T::ZERO) & (c * sign < T::ZERO) & (d * sign < T::ZERO)) {
+    let sign = copysign(T::ONE, a);
+    if !((a * sign > T::ZERO) & (b * sign > T::ZERO) & (c * sign < T::ZERO) & (d * sign < T::ZERO)) {
         return None;
     }
+    let y2 = y2();
+    let n2 = y2.cross(z2);
     let t = t * (sign / sqrt(t.norm_squared()));
-    let (e, f) = (z2.cross(&t).dot(n2), y2.cross(&t).dot(n2));
-    ((e > T::ZERO) & (f > T::ZERO)).then_some(t)
+    let along = n2.cross(z2);
+    let across = n2.cross(&y2);
+    ((along.dot(&t) > T::ZERO) & (across.dot(&t) > T::ZERO)).then_some(t)
 }
 
 #[derive(Clone, Copy)]

@@ -103,7 +103,8 @@ fn solve<T: Real>(pixels: &[Vector2<T>], points: &[Vector3<T>]) -> Option<Matrix
     {
         return None;
     }
-    let q = Matrix3x4::from_row_slice(&least.vector);
+    let v = &least.vector;
+    let q = Matrix3x4::new(v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8], v[9], v[10], v[11]);
     // x = T^-1 Q U X with U X = scale_p (X - mean_p), T x = scale_x (x - mean_x)
     let m = q.fixed_columns::<3>(0) * scale_p;
     let last = q.column(3) - m * mean_p;

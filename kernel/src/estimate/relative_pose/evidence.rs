@@ -22,7 +22,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::Real;
 use crate::geometry::pose::nearest_rotation;
-use crate::linalg::{LANES, Lanes};
+use crate::linalg::LANES;
 use crate::real::{from_u32, lit, ln, max, sqrt};
 use crate::refine::blocks::EpipolarBlock;
 use crate::refine::homography::{RotationModel, transfer_sq};
@@ -109,7 +109,8 @@ impl<T: Real, B: EpipolarBlock<T>> Evidence<'_, '_, T, B> {
     pub(super) fn rotation(&self, start: &PoseModel<T>) -> Option<RotationModel<T>> {
         let mut model = RotationModel { rotation: start.rotation, scales: start.scales };
         let mut limit: T = T::MAX;
-        for round in 0..6 {
+        // From coarse to fine, so that a few wrong ones do not hold the rest.
+        for factor in [64.0, 24.0, 12.0, 8.0, 5.0, 5.0] {
             let h = model.matrix();
             let mut moment = Matrix3::zeros();
             let mut mask = self.inliers.iter();
@@ -119,18 +120,19 @@ impl<T: Real, B: EpipolarBlock<T>> Evidence<'_, '_, T, B> {
                 let squared = transfer_sq(&h, &plane, &weight);
                 let (f1, f2) = block.directions();
                 for (l, &inlier) in (0..LANES).zip(mask.by_ref()) {
-                    if inlier && (round == 0 || squared[l] < limit) {
-                        let unit = |f: &[Lanes<T>; 3], s: [T; 2]| {
-                            let v = Vector3::new(f[0][l] * s[0], f[1][l] * s[1], f[2][l]);
+                    if inlier && squared[l] < limit {
+                        let unit = |x: T, y: T, z: T| {
+                            let v = Vector3::new(x, y, z);
                             v * (T::ONE / sqrt(v.norm_squared()))
                         };
-                        moment += unit(&f2, s2) * unit(&f1, s1).transpose();
+                        let v1 = unit(f1[0][l] * s1[0], f1[1][l] * s1[1], f1[2][l]);
+                        let v2 = unit(f2[0][l] * s2[0], f2[1][l] * s2[1], f2[2][l]);
+                        moment += v2 * v1.transpose();
                     }
                 }
             }
             model.rotation = nearest_rotation(&moment)?;
-            // From coarse to fine, so that a few wrong ones do not hold the rest.
-            let factor: T = lit([64.0, 24.0, 12.0, 8.0, 5.0, 5.0][round]);
+            let factor: T = lit(factor);
             limit = factor * factor * self.sigma * self.sigma;
         }
         Some(model)

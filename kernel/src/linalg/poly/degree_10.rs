@@ -176,10 +176,12 @@ fn bernstein<T: Real>(c: &Coefficients<T>, side: T) -> Coefficients<T> {
         1.0 / 10.0,
         1.0,
     ];
-    let mut b: Coefficients<T> = core::array::from_fn(|i| {
-        let v = c[i] * lit(WEIGHTS[i]);
-        if i % 2 == 1 { v * side } else { v }
-    });
+    let mut b = *c;
+    let mut sign = T::ONE;
+    for (v, weight) in b.iter_mut().zip(WEIGHTS) {
+        *v = *v * lit(weight) * sign;
+        sign *= side;
+    }
     for level in 1..11 {
         for j in (level..11).rev() {
             b[j] += b[j - 1];
@@ -264,7 +266,10 @@ fn isolate<T: Real>(
 /// Whether the slopes of the control polygon change sign once.
 #[inline]
 fn one_extremum<T: Real>(b: &Coefficients<T>) -> bool {
-    let slopes: [T; 10] = core::array::from_fn(|i| b[i + 1] - b[i]);
+    let mut slopes = [T::ZERO; 10];
+    for (slope, (u, v)) in slopes.iter_mut().zip(b.iter().zip(b.iter().skip(1))) {
+        *slope = *v - *u;
+    }
     sign_changes(&slopes) == 1
 }
 

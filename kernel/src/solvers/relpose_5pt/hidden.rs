@@ -113,7 +113,10 @@ impl<T: Real> HiddenRow<T> {
     #[inline(always)]
     fn dot(&self, other: &Self) -> T {
         // Four sums, so that no addition waits for the one before it.
-        let mut sum: [T; 4] = core::array::from_fn(|i| self.x[i] * other.x[i]);
+        let mut sum = self.x;
+        for i in 0..4 {
+            sum[i] *= other.x[i];
+        }
         for i in 0..4 {
             sum[i] += self.y[i] * other.y[i];
         }

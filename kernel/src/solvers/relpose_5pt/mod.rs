@@ -131,7 +131,12 @@ fn solve<T: Real, W: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) -> Soluti
         ];
     }
     let Some(null) = null_space::<T, 5, 9, 4>(&rows) else { return Solutions::new() };
-    let basis: [[T; 4]; 9] = core::array::from_fn(|i| [null[0][i], null[1][i], null[2][i], null[3][i]]);
+    let mut basis = [[T::ZERO; 4]; 9];
+    for (k, vector) in null.iter().enumerate() {
+        for (row, &v) in basis.iter_mut().zip(vector) {
+            row[k] = v;
+        }
+    }
     let Some(rows) = hidden::eliminate(&mut essential_cubics(&basis)) else { return Solutions::new() };
 
     let error = lit::<W>(POLYNOMIAL_ERROR) * lit(T::EPSILON.to_f64());
@@ -169,10 +174,7 @@ fn solve<T: Real, W: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) -> Soluti
 
     let mut solutions = Solutions::new();
     for c in found.coefficients.iter().take(found.len) {
-        let e: [T; 9] = core::array::from_fn(|i| {
-            let b = &basis[i];
-            (b[0] * c[0] + b[1] * c[1]) + (b[2] * c[2] + b[3] * c[3])
-        });
+        let e = basis.map(|b| (b[0] * c[0] + b[1] * c[1]) + (b[2] * c[2] + b[3] * c[3]));
         solutions.push(Essential(Matrix3::new(e[0], e[1], e[2], e[3], e[4], e[5], e[6], e[7], e[8])));
     }
     solutions
@@ -225,15 +227,17 @@ impl<T: Real> Found<T> {
     /// The first `count` of four candidates.
     #[inline(never)]
     fn add_group(&mut self, basis: &[[T; 4]; 9], mut c: [Four<T>; 4], count: usize) {
-        let mut arrived: [bool; 4] = core::array::from_fn(|k| k >= count);
+        let mut arrived = [0, 1, 2, 3].map(|k| k >= count);
         let threshold = Four::splat(T::EPSILON);
         let mut near = [false; 4];
         for _ in 0..STEPS {
             let (next, step_sq) = polish::newton_step(basis, &c);
-            c = core::array::from_fn(|k| Four::select(near, c[k], next[k]));
+            c = polish::select(near, &c, &next);
             let small = threshold.greater(step_sq);
-            near = core::array::from_fn(|k| near[k] | small[k]);
-            arrived = core::array::from_fn(|k| arrived[k] | small[k]);
+            for k in 0..4 {
+                near[k] |= small[k];
+                arrived[k] |= small[k];
+            }
             if arrived == [true; 4] {
                 break;
             }

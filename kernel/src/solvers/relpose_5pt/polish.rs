@@ -31,36 +31,38 @@ pub(super) fn select<T: Real, const N: usize>(
     a: &[Four<T>; N],
     b: &[Four<T>; N],
 ) -> [Four<T>; N] {
-    core::array::from_fn(|i| Four::select(mask, a[i], b[i]))
+    let mut selected = *b;
+    for (s, &a) in selected.iter_mut().zip(a) {
+        *s = Four::select(mask, a, *s);
+    }
+    selected
 }
 
 /// One step from the unit vectors `c`: the next unit vectors, and the squared lengths of the steps.
 #[inline(never)]
 pub(super) fn newton_step<T: Real>(basis: &[[T; 4]; 9], c: &[Four<T>; 4]) -> ([Four<T>; 4], Four<T>) {
-    let e: [Four<T>; 9] = core::array::from_fn(|i| {
-        let [b0, b1, b2, b3] = basis[i];
-        (c[0].times(b0) + c[1].times(b1)) + (c[2].times(b2) + c[3].times(b3))
-    });
+    let e =
+        basis.map(|[b0, b1, b2, b3]| (c[0].times(b0) + c[1].times(b1)) + (c[2].times(b2) + c[3].times(b3)));
     let columns = [[e[0], e[3], e[6]], [e[1], e[4], e[7]], [e[2], e[5], e[8]]];
     // u1 along the largest column; the left null vector from it and the better of the others.
     let [mut first, mut second, mut third] = columns;
     let mut largest = norm_sq(&first);
-    for (a, b, d) in [(1, 2, 0), (2, 0, 1)] {
-        let size = norm_sq(&columns[a]);
+    let [x, y, z] = &columns;
+    for (a, b, d) in [(y, z, x), (z, x, y)] {
+        let size = norm_sq(a);
         let mask = size.greater(largest);
         largest = Four::select(mask, size, largest);
-        first = select(mask, &columns[a], &first);
-        second = select(mask, &columns[b], &second);
-        third = select(mask, &columns[d], &third);
+        first = select(mask, a, &first);
+        second = select(mask, b, &second);
+        third = select(mask, d, &third);
     }
     let s = Four::splat(T::ONE) / largest.root();
     let u1 = first.map(|v| v * s);
     let (p, q) = (cross(&u1, &second), cross(&u1, &third));
     let u3 = unit(&select(norm_sq(&p).greater(norm_sq(&q)), &p, &q));
     let u2 = cross(&u3, &u1);
-    let transposed = |u: &V3<T>| -> V3<T> {
-        core::array::from_fn(|j| columns[j][0] * u[0] + columns[j][1] * u[1] + columns[j][2] * u[2])
-    };
+    let transposed =
+        |u: &V3<T>| -> V3<T> { columns.map(|column| column[0] * u[0] + column[1] * u[1] + column[2] * u[2]) };
     let v1 = unit(&transposed(&u1));
     let v3 = unit(&cross(&v1, &transposed(&u2)));
     let v2 = cross(&v3, &v1);
@@ -90,6 +92,6 @@ pub(super) fn newton_step<T: Real>(basis: &[[T; 4]; 9], c: &[Four<T>; 4]) -> ([F
     let s = Four::splat(T::ONE) / length;
     let s = Four::select(Four::splat(T::ZERO).greater(along), -s, s);
     let next = n.map(|v| v * s);
-    let d: [Four<T>; 4] = core::array::from_fn(|k| next[k] - c[k]);
+    let d = [next[0] - c[0], next[1] - c[1], next[2] - c[2], next[3] - c[3]];
     (next, d[0] * d[0] + d[1] * d[1] + (d[2] * d[2] + d[3] * d[3]))
 }
