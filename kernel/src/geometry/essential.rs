@@ -271,11 +271,12 @@ impl<T: Real> TwistedPair<T> {
     }
 }
 
-/// The matrix, rescaled where its squares would overflow or underflow; `None` where it is zero or not finite.
+/// The matrix, rescaled where the eighth powers of its elements would overflow or underflow; `None` where it is zero or
+/// not finite.
 #[inline]
 fn in_range<T: Real>(m: &Matrix3<T>) -> Option<Matrix3<T>> {
     let size = m.norm_squared();
-    if size > T::MIN_POSITIVE / (T::EPSILON * T::EPSILON) && size <= T::MAX {
+    if size > lit(1e-6) && size < lit(1e6) {
         return Some(*m);
     }
     let largest = m.iter().fold(T::ZERO, |s, &v| max(s, abs(v)));
