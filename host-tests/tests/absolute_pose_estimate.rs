@@ -2,7 +2,7 @@
 
 use epipole::estimate::{
     AbsolutePoseError, AbsolutePoseEstimate, AbsolutePoseOptions, AbsolutePoseStorage, AbsolutePoseVerdict,
-    GravityFit, GravityPrior, Unobservable, WideAbsolutePoseStorage, absolute_pose,
+    GravityPrior, PriorFit, Unobservable, WideAbsolutePoseStorage, absolute_pose,
 };
 use epipole::geometry::pose::log;
 use epipole::geometry::{CameraModel, KannalaBrandt, Pinhole, Pose};
@@ -111,13 +111,13 @@ in_both_scalars! {
                 options
             };
             let aided = run(&pixels, &points, &prior(0.006, rng));
-            assert!(matches!(aided.gravity, Some(GravityFit::Fits(_))), "{:?}", aided.gravity);
+            assert!(matches!(aided.gravity, Some(PriorFit::Fits(_))), "{:?}", aided.gravity);
             let error = |e: &AbsolutePoseEstimate<T>| rotation_error(&e.pose().expect("a pose").rotation, &p.pose.rotation);
             assert!(error(&aided) < 5e-3);
             iterations[0] += plain.report.spent.iterations;
             iterations[1] += aided.report.spent.iterations;
             let wrong = run(&pixels, &points, &prior(0.17, rng));
-            assert!(matches!(wrong.gravity, Some(GravityFit::Contradicted(_))), "{:?}", wrong.gravity);
+            assert!(matches!(wrong.gravity, Some(PriorFit::Contradicted(_))), "{:?}", wrong.gravity);
             let apart = rotation_error(&wrong.pose().expect("a pose").rotation, &plain.pose().expect("a pose").rotation);
             assert!(apart < 1e-3, "{apart}");
         });

@@ -4,13 +4,13 @@ use epipole::Real;
 use epipole::estimate::{
     AbsolutePoseEstimate, AbsolutePoseOptions, AbsolutePoseStorage, AbsolutePoseVerdict,
     AbsolutePoseWorkspace, FundamentalEstimate, FundamentalOptions, GravityPrior, HomographyEstimate,
-    HomographyOptions, HomographyVerdict, RelativePoseEstimate, RelativePoseOptions, RelativePoseVerdict,
-    TwoViewStorage, TwoViewWorkspace, WideAbsolutePoseStorage, WideTwoViewStorage, absolute_pose,
-    absolute_pose_guided, fundamental, fundamental_guided, homography, homography_guided,
-    refine_relative_pose, relative_pose, relative_pose_guided,
+    HomographyOptions, HomographyVerdict, PriorFit, RelativePoseEstimate, RelativePoseOptions,
+    RelativePosePrior, RelativePoseVerdict, TwoViewStorage, TwoViewWorkspace, WideAbsolutePoseStorage,
+    WideTwoViewStorage, absolute_pose, absolute_pose_guided, fundamental, fundamental_guided, homography,
+    homography_guided, refine_relative_pose, relative_pose, relative_pose_guided,
 };
 use epipole::geometry::{Camera, CameraModel};
-use epipole::nalgebra::Vector2;
+use epipole::nalgebra::{Matrix3, Vector2};
 use epipole::real::lit;
 use epipole::robust::Guide;
 
@@ -74,6 +74,11 @@ fn take<T: Real>(estimate: &RelativePoseEstimate<T>, sink: &mut Sink) {
     sink.flag(estimate.pose().is_some());
     sink.finite(&[estimate.noise_px]);
     sink.count(estimate.report.inliers as usize);
+    match estimate.prior {
+        Some(PriorFit::Fits(by)) => sink.finite(&[by]),
+        Some(PriorFit::Contradicted(by)) => sink.finite(&[by]),
+        _ => sink.flag(false),
+    }
 }
 
 fn relative<T: Real>(source: &mut Source<'_>, sink: &mut Sink, workspace: &mut TwoViewWorkspace<'_, T>) {
@@ -90,6 +95,21 @@ fn relative<T: Real>(source: &mut Source<'_>, sink: &mut Sink, workspace: &mut T
         options.max_error_px = source.scalar();
         options.sigma_px = Some(source.scalar());
     }
+    options.prior = match source.below(4) {
+        0 => {
+            let [view1, view2] = source.vectors();
+            Some(RelativePosePrior::Gravity { view1, view2, sigma_rad: source.positive() })
+        }
+        1 => {
+            let spread: T = source.positive();
+            Some(RelativePosePrior::Rotation {
+                rotation: source.small_rotation(),
+                covariance: Matrix3::identity() * (spread * spread * lit(1e-3))
+                    + source.matrix() * lit::<T>(1e-3),
+            })
+        }
+        _ => None,
+    };
     sink.count(workspace.capacity());
     sink.count(workspace.wide_capacity());
     if let Ok(estimate) = relative_pose(&camera1, &camera2, x1, x2, &options, workspace) {

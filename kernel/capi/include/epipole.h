@@ -757,8 +757,8 @@ typedef struct epi_absolute_pose_estimate_f32 {
     uint32_t has_covariance[2];
     // Estimate of the noise of one image coordinate, pixels; 0 without a pose.
     float noise_px;
-    // Of a gravity prior: the angle between it and the pose found, rad.
-    float gravity_angle_rad;
+    // Of a gravity prior: by how many standard deviations it differs from the pose found.
+    float gravity_deviations;
     // Root mean square of the inliers' reprojection errors, pixels.
     float rms_px[2];
     // World to camera.
@@ -1129,8 +1129,8 @@ typedef struct epi_absolute_pose_estimate_f64 {
     uint32_t has_covariance[2];
     // Estimate of the noise of one image coordinate, pixels; 0 without a pose.
     double noise_px;
-    // Of a gravity prior: the angle between it and the pose found, rad.
-    double gravity_angle_rad;
+    // Of a gravity prior: by how many standard deviations it differs from the pose found.
+    double gravity_deviations;
     // Root mean square of the inliers' reprojection errors, pixels.
     double rms_px[2];
     // World to camera.

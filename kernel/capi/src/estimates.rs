@@ -102,8 +102,8 @@ pub struct AbsolutePoseEstimate<T> {
     pub has_covariance: [u32; 2],
     /// Estimate of the noise of one image coordinate, pixels; 0 without a pose.
     pub noise_px: T,
-    /// Of a gravity prior: the angle between it and the pose found, rad.
-    pub gravity_angle_rad: T,
+    /// Of a gravity prior: by how many standard deviations it differs from the pose found.
+    pub gravity_deviations: T,
     /// Root mean square of the inliers' reprojection errors, pixels.
     pub rms_px: [T; 2],
     /// World to camera.
@@ -282,7 +282,7 @@ impl<T: Real> From<&estimate::FundamentalEstimate<T>> for FundamentalEstimate<T>
 impl<T: Real> From<&estimate::AbsolutePoseEstimate<T>> for AbsolutePoseEstimate<T> {
     fn from(kernel: &estimate::AbsolutePoseEstimate<T>) -> Self {
         use enums::{AbsolutePoseVerdict as C, GravityFit as Fit};
-        use estimate::{AbsolutePoseVerdict as Kernel, GravityFit};
+        use estimate::{AbsolutePoseVerdict as Kernel, PriorFit};
         let (verdict, poses, unobservable) = match &kernel.verdict {
             Kernel::Pose(pose) => (C::Pose, core::slice::from_ref(pose), 0),
             Kernel::PlanarAmbiguity(poses) => (C::PlanarAmbiguity, poses.as_slice(), 0),
@@ -292,10 +292,10 @@ impl<T: Real> From<&estimate::AbsolutePoseEstimate<T>> for AbsolutePoseEstimate<
             Kernel::NoConsensus => (C::NoConsensus, &[][..], 0),
             _ => (C::Other, &[][..], 0),
         };
-        let (gravity, gravity_angle_rad) = match kernel.gravity {
+        let (gravity, gravity_deviations) = match kernel.gravity {
             None => (Fit::None, T::ZERO),
-            Some(GravityFit::Fits(angle)) => (Fit::Fits, angle),
-            Some(GravityFit::Contradicted(angle)) => (Fit::Contradicted, angle),
+            Some(PriorFit::Fits(by)) => (Fit::Fits, by),
+            Some(PriorFit::Contradicted(by)) => (Fit::Contradicted, by),
             Some(_) => (Fit::Other, T::ZERO),
         };
         let mut found = Self {
@@ -306,7 +306,7 @@ impl<T: Real> From<&estimate::AbsolutePoseEstimate<T>> for AbsolutePoseEstimate<
             gravity: gravity as u32,
             has_covariance: [0; 2],
             noise_px: kernel.noise_px,
-            gravity_angle_rad,
+            gravity_deviations,
             rms_px: [T::ZERO; 2],
             poses: [Pose::zero(); 2],
             covariance: [[[T::ZERO; 6]; 6]; 2],

@@ -16,6 +16,9 @@ pub enum TwoViewError {
     Options(OptionsError),
     /// The pose to start from is not finite, or its translation is zero.
     Pose,
+    /// Of a prior of the relative pose: a direction without length, an uncertainty that is not positive definite, or a
+    /// number that is not finite.
+    Prior,
 }
 
 impl fmt::Display for TwoViewError {
@@ -24,6 +27,9 @@ impl fmt::Display for TwoViewError {
             Self::Input(error) => error.fmt(f),
             Self::Options(error) => error.fmt(f),
             Self::Pose => f.write_str("the pose to start from is not finite, or its translation is zero"),
+            Self::Prior => {
+                f.write_str("the prior needs finite directions or a rotation, and a positive uncertainty")
+            }
         }
     }
 }

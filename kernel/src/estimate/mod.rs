@@ -18,14 +18,15 @@ mod frame;
 mod fundamental;
 mod homography;
 mod load;
+mod prior;
 mod relative_pose;
 mod transfer;
 mod workspace;
 
 pub use absolute_pose::{
     AbsolutePose, AbsolutePoseError, AbsolutePoseEstimate, AbsolutePoseOptions, AbsolutePoseStorage,
-    AbsolutePoseVerdict, AbsolutePoseWorkspace, GravityFit, GravityPrior, WideAbsolutePoseStorage,
-    absolute_pose, absolute_pose_guided,
+    AbsolutePoseVerdict, AbsolutePoseWorkspace, GravityPrior, WideAbsolutePoseStorage, absolute_pose,
+    absolute_pose_guided,
 };
 pub use error::TwoViewError;
 pub use fundamental::{
@@ -36,9 +37,11 @@ pub use homography::{
     FoundHomography, HomographyError, HomographyEstimate, HomographyOptions, HomographyStorage,
     HomographyVerdict, HomographyWorkspace, homography, homography_guided,
 };
+pub use prior::PriorFit;
 pub use relative_pose::{
     GeneralMotion, PlanarPose, PureRotation, RelativePoseError, RelativePoseEstimate, RelativePoseOptions,
-    RelativePoseVerdict, Unobservable, refine_relative_pose, relative_pose, relative_pose_guided,
+    RelativePosePrior, RelativePoseVerdict, Unobservable, refine_relative_pose, relative_pose,
+    relative_pose_guided,
 };
 pub use workspace::{
     RelativePoseStorage, RelativePoseWorkspace, TwoViewStorage, TwoViewWorkspace, WideTwoViewStorage,

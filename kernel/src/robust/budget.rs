@@ -30,14 +30,25 @@ pub struct Budget {
     pub max_iterations: u32,
     /// Minimal problems solved (degenerate samples cost none). Default: no limit.
     pub max_solver_calls: u32,
-    /// Residuals evaluated, of one correspondence under one model each. Default: no limit. The work done beyond it
-    /// is at most the hypotheses of one sample and one refinement.
+    /// Residuals evaluated, of one correspondence under one model each. Default: no limit. The search stays
+    /// within it but for one local optimisation.
     pub max_residuals: u64,
 }
 
 impl Default for Budget {
     fn default() -> Self {
         Self { max_iterations: 10_000, max_solver_calls: u32::MAX, max_residuals: u64::MAX }
+    }
+}
+
+impl Budget {
+    /// What is left after `spent`.
+    pub(crate) fn less(&self, spent: &Progress) -> Self {
+        Self {
+            max_iterations: self.max_iterations.saturating_sub(spent.iterations),
+            max_solver_calls: self.max_solver_calls.saturating_sub(spent.solver_calls),
+            max_residuals: self.max_residuals.saturating_sub(spent.residuals),
+        }
     }
 }
 
@@ -150,6 +161,20 @@ pub struct Progress {
     pub refinements: u32,
     /// Inliers of the best model.
     pub inliers: u32,
+}
+
+impl Progress {
+    /// This, and what another search spent; the inliers are this one's.
+    pub(crate) fn plus(&self, other: &Self) -> Self {
+        Self {
+            iterations: self.iterations.saturating_add(other.iterations),
+            solver_calls: self.solver_calls.saturating_add(other.solver_calls),
+            hypotheses: self.hypotheses.saturating_add(other.hypotheses),
+            residuals: self.residuals.saturating_add(other.residuals),
+            refinements: self.refinements.saturating_add(other.refinements),
+            inliers: self.inliers,
+        }
+    }
 }
 
 /// Why a run ended.

@@ -15,12 +15,22 @@ pub trait Estimator<T: Real, const S: usize> {
     /// serve where a minimal sample already fixes the model well.
     const NEAR_MISSES: u32 = 10;
 
+    /// Residuals of one correspondence that [`polish`](Self::polish) and [`score`](Self::score) together evaluate at the
+    /// most, for one hypothesis.
+    const SCORE_PASSES: u32 = 2;
+
     /// How many correspondences there are.
     fn count(&self) -> u32;
 
     /// Hands every model of a minimal sample that passes its own checks (cheirality, orientation) to `found`; false,
     /// and nothing handed over, where the sample was rejected as degenerate before it was solved.
     fn generate(&self, sample: &[u32; S], found: &mut impl FnMut(&Self::Model)) -> bool;
+
+    /// A hypothesis as it is to be scored; none where it is not worth that. Serves problems whose minimal models are off
+    /// by more than the noise. Adds the residuals evaluated.
+    fn polish(&self, model: &Self::Model, _counts: &mut ScoreCounts) -> Option<Self::Model> {
+        Some(*model)
+    }
 
     /// The score of a model, or none where `gate` rejected it; adds the residuals evaluated and, of a rejected model,
     /// its inliers to the counts.

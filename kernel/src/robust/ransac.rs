@@ -118,6 +118,10 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
     let mut needed = u32::MAX;
     let mut gate = gate::<T>(T::MAX, least_inliers, count, &counts);
     let budget = options.budget;
+    // What may be spent when another hypothesis is looked at, and whether more has been.
+    let one_score = E::SCORE_PASSES as u64 * count as u64;
+    let last_start = budget.max_residuals.saturating_sub(one_score);
+    let mut exhausted = budget.max_residuals < one_score;
     let mut stop = StopReason::MaxIterations;
 
     while spent.iterations < budget.max_iterations {
@@ -129,7 +133,7 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
             stop = StopReason::MaxSolverCalls;
             break;
         }
-        if spent.residuals >= budget.max_residuals {
+        if exhausted || spent.residuals >= budget.max_residuals {
             stop = StopReason::MaxResiduals;
             break;
         }
@@ -156,7 +160,12 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
         let mut leader: Option<(E::Model, Score<T>)> = None;
         let mut hypotheses = 0;
         let solved = estimator.generate(&sample, &mut |model| {
+            exhausted |= counts.residuals + refined_residuals > last_start;
+            if exhausted {
+                return;
+            }
             hypotheses += 1;
+            let Some(model) = &estimator.polish(model, &mut counts) else { return };
             gate.bound = bound;
             let score = estimator.score(model, &gate, &mut counts);
             let Some(score) = score else { return };

@@ -6,11 +6,13 @@ use crate::Real;
 use crate::linalg::{LANES, Lanes};
 use crate::real::{from_u32, is_finite, lit, sqrt};
 use crate::refine::blocks::BlockSlice;
-use crate::refine::lm::{Minimum, NormalEquations, descend};
+use crate::refine::lm::{Minimum, descend};
 use crate::refine::reprojection::{CameraPose, ReprojectionBlock, normal_equations, squared};
 use crate::robust::loss::Loss;
 use crate::robust::{Estimator, Gate, Score, ScoreCounts, Tally};
 use crate::solvers::{abspose_upright_2pt, p3p};
+
+use super::Gravity;
 
 /// Blocks scored between two looks at the gate.
 const CHUNK: usize = 2;
@@ -27,17 +29,6 @@ pub(super) struct PoseProblem<'a, T, B> {
     pub(super) facing: T,
     /// Blocks between two that are scored one after the other.
     pub(super) stride: usize,
-}
-
-/// A direction known in both frames, and how well.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Direction<T: Real> {
-    /// Unit vector in the world.
-    pub(super) world: Vector3<T>,
-    /// Unit vector in the camera.
-    pub(super) camera: Vector3<T>,
-    /// Weight of the squared chord between the two, px^2.
-    pub(super) weight: T,
 }
 
 impl<'a, T: Real, B: ReprojectionBlock<T>> PoseProblem<'a, T, B> {
@@ -111,14 +102,14 @@ impl<'a, T: Real, B: ReprojectionBlock<T>> PoseProblem<'a, T, B> {
         &self,
         pose: &CameraPose<T>,
         loss: &Loss<T>,
-        direction: Option<&Direction<T>>,
+        gravity: Option<&Gravity<T>>,
         passes: u32,
         tolerance: T,
     ) -> Minimum<CameraPose<T>, T, 6> {
         let equations = |pose: &CameraPose<T>| {
             let mut sums = normal_equations(self.data, pose, self.focal, loss);
-            if let Some(direction) = direction {
-                add_direction(&mut sums, pose, direction);
+            if let Some(gravity) = gravity {
+                gravity.direction.add(&mut sums, &pose.rotation, gravity.weight);
             }
             sums
         };
@@ -169,21 +160,6 @@ impl<'a, T: Real, B: ReprojectionBlock<T>> PoseProblem<'a, T, B> {
         *residuals += minimum.passes as u64 * self.data.count as u64;
         Some(minimum.model)
     }
-}
-
-/// Adds `weight |R g_w - g_c|^2`.
-fn add_direction<T: Real>(sums: &mut NormalEquations<T, 6>, pose: &CameraPose<T>, direction: &Direction<T>) {
-    let k = direction.weight;
-    let a = pose.rotation * direction.world;
-    let g = direction.camera.cross(&a) * k;
-    for p in 0..3 {
-        sums.gradient.data.0[0][p] += g[p];
-        for q in 0..3 {
-            let own = if p == q { T::ONE } else { T::ZERO };
-            sums.hessian.data.0[q][p] += k * (own - a[p] * a[q]);
-        }
-    }
-    sums.cost += k * (a - direction.camera).norm_squared();
 }
 
 fn coprime(mut a: usize, mut b: usize) -> bool {

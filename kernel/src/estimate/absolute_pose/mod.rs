@@ -7,7 +7,8 @@ use core::fmt;
 use nalgebra::{Matrix6, Vector2, Vector3};
 
 use super::Unobservable;
-use crate::geometry::pose::{skew, upright, vector_angle};
+use super::prior::{Direction, PriorFit};
+use crate::geometry::pose::{skew, upright};
 use crate::geometry::{CameraModel, Pose};
 use crate::linalg::{LANES, Ldlt};
 use crate::real::{abs, from_u32, is_finite, lit, ln, max, sqrt};
@@ -26,9 +27,9 @@ mod shape;
 mod verdict;
 mod workspace;
 
-use hypothesis::{Direction, PoseProblem, UprightProblem};
+use hypothesis::{PoseProblem, UprightProblem};
 use shape::{Shape, shape_of_inliers};
-pub use verdict::{AbsolutePose, AbsolutePoseEstimate, AbsolutePoseVerdict, GravityFit};
+pub use verdict::{AbsolutePose, AbsolutePoseEstimate, AbsolutePoseVerdict};
 pub use workspace::{AbsolutePoseStorage, AbsolutePoseWorkspace, WideAbsolutePoseStorage};
 
 /// Gravity as an inertial unit knows it.
@@ -311,6 +312,8 @@ fn fill<T: Real, B: Block<T>, const W: usize>(numbers: &mut [T], mut from: impl 
 #[derive(Clone, Copy, Debug)]
 struct Gravity<T: Real> {
     direction: Direction<T>,
+    /// Weight of the squared chord between the two, px^2.
+    weight: T,
     sigma_rad: T,
 }
 
@@ -319,16 +322,14 @@ impl<T: Real> Gravity<T> {
         if !(is_finite(prior.sigma_rad) && prior.sigma_rad > T::ZERO) {
             return None;
         }
-        // The row of the turn that goes to +y is the unit vector.
-        let unit = |v: &Vector3<T>| upright(v).map(|turn| turn.row(1).transpose());
         let ratio = sigma_px / prior.sigma_rad;
-        let direction =
-            Direction { world: unit(&prior.world)?, camera: unit(&prior.camera)?, weight: ratio * ratio };
-        Some(Self { direction, sigma_rad: prior.sigma_rad })
+        let direction = Direction::new(&prior.world, &prior.camera)?;
+        Some(Self { direction, weight: ratio * ratio, sigma_rad: prior.sigma_rad })
     }
 
+    /// The angle between the two in standard deviations.
     fn deviation(&self, pose: &CameraPose<T>) -> T {
-        vector_angle(&(pose.rotation * self.direction.world), &self.direction.camera)
+        self.direction.turn_between(&pose.rotation) / self.sigma_rad
     }
 }
 
@@ -382,12 +383,12 @@ fn estimate<T: Real, B: ReprojectionBlock<T>>(
         return estimate;
     };
     estimate.gravity = gravity;
-    let direction = match (gravity, &task.gravity) {
-        (Some(GravityFit::Fits(_)), Some(gravity)) => Some(gravity.direction),
+    let gravity = match gravity {
+        Some(PriorFit::Fits(_)) => task.gravity.as_ref(),
         _ => None,
     };
     let loss = Loss::Truncated(problem.threshold);
-    let best = problem.optimise(&model, &loss, direction.as_ref(), 12, lit(1e-6));
+    let best = problem.optimise(&model, &loss, gravity, 12, lit(1e-6));
     let mut mask = workspace.inliers.iter_mut();
     problem.for_each_block(&best.model, |_, relative, filled| {
         for (inlier, &s) in mask.by_ref().take(filled).zip(relative) {
@@ -410,7 +411,7 @@ fn estimate<T: Real, B: ReprojectionBlock<T>>(
         Shape::Line => AbsolutePoseVerdict::Unobservable(Unobservable::Collinear),
         Shape::Volume => AbsolutePoseVerdict::Pose(first),
         Shape::Flat { twin } => {
-            let second = problem.optimise(&twin, &loss, direction.as_ref(), 20, lit(1e-6));
+            let second = problem.optimise(&twin, &loss, gravity, 20, lit(1e-6));
             let turned = (second.model.rotation - best.model.rotation).norm_squared();
             let moved = (second.model.translation - best.model.translation).norm_squared();
             let same = turned < lit(1e-4) && moved < lit::<T>(1e-4) * best.model.translation.norm_squared();
@@ -437,34 +438,35 @@ fn search<T: Real, B: ReprojectionBlock<T>>(
     problem: &PoseProblem<'_, T, B>,
     order: Option<&[u32]>,
     mut keep_going: Option<&mut dyn FnMut(&crate::robust::Progress) -> bool>,
-) -> (Consensus<CameraPose<T>, T>, Option<GravityFit<T>>) {
+) -> (Consensus<CameraPose<T>, T>, Option<PriorFit<T>>) {
     let options = &task.options.ransac;
     let Some(gravity) = &task.gravity else {
         return (ransac::<T, _, 3>(problem, options, order, NEEDED as u32, keep_going), None);
     };
-    let angle_of = |consensus: &Consensus<CameraPose<T>, T>| {
+    let deviations_of = |consensus: &Consensus<CameraPose<T>, T>| {
         consensus.models[0].map_or(T::MAX, |(model, _)| gravity.deviation(&model))
     };
-    let limit = gravity.sigma_rad * lit(PRIOR_SIGMAS);
+    let limit = lit(PRIOR_SIGMAS);
     let upright_frame = |v: &Vector3<T>| upright(v).unwrap_or_else(nalgebra::Matrix3::identity);
     let aided = UprightProblem {
         problem: *problem,
-        world: upright_frame(&gravity.direction.world),
-        camera: upright_frame(&gravity.direction.camera),
+        world: upright_frame(&gravity.direction.from),
+        camera: upright_frame(&gravity.direction.to),
     };
     // Reborrowed, for the second search may need it.
     let again = keep_going.as_mut().map(|ask| &mut **ask as &mut dyn FnMut(&_) -> bool);
     let first = ransac::<T, _, 2>(&aided, options, order, NEEDED as u32, again);
-    let angle = angle_of(&first);
+    let deviations = deviations_of(&first);
     // Where less than 30 % agree, or the optimum has left the prior, the prior must win against a search without it.
     let share = from_u32::<T>(first.report.inliers) / from_u32(problem.data.count as u32);
-    if angle < limit && share > lit(0.3) {
-        return (first, Some(GravityFit::Fits(angle)));
+    if deviations < limit && share > lit(0.3) {
+        return (first, Some(PriorFit::Fits(deviations)));
     }
     let second = ransac::<T, _, 3>(problem, options, order, NEEDED as u32, keep_going);
     let chosen = if second.report.cost < first.report.cost { second } else { first };
-    let angle = angle_of(&chosen);
-    let fit = if angle < limit { GravityFit::Fits(angle) } else { GravityFit::Contradicted(angle) };
+    let deviations = deviations_of(&chosen);
+    let fit =
+        if deviations < limit { PriorFit::Fits(deviations) } else { PriorFit::Contradicted(deviations) };
     (chosen, chosen.models[0].map(|_| fit))
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix6;
 
-use crate::estimate::Unobservable;
+use crate::estimate::{PriorFit, Unobservable};
 use crate::geometry::Pose;
 use crate::robust::RansacReport;
 use crate::{Real, Solutions};
@@ -38,17 +38,6 @@ pub struct AbsolutePose<T: Real> {
     pub rms_px: T,
 }
 
-/// Whether a gravity prior helped.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum GravityFit<T> {
-    /// The pose found agrees with the prior, which took part in its refinement. The angle between the two, rad.
-    Fits(T),
-    /// The correspondences contradict the prior: it was left aside. The angle between the two, rad.
-    Contradicted(T),
-}
-
 /// A verdict and how it was reached.
 #[derive(Clone, Debug, PartialEq)]
 #[must_use]
@@ -56,7 +45,7 @@ pub struct AbsolutePoseEstimate<T: Real> {
     /// The verdict.
     pub verdict: AbsolutePoseVerdict<T>,
     /// Of a gravity prior: whether it fits; none without a prior or a pose.
-    pub gravity: Option<GravityFit<T>>,
+    pub gravity: Option<PriorFit<T>>,
     /// Estimate of the noise of one image coordinate from the inliers' residuals, pixels; 0 without a pose.
     pub noise_px: T,
     /// How the search went.

@@ -7,23 +7,27 @@ use crate::geometry::Essential;
 use crate::linalg::{LANES, Lanes};
 use crate::real::{abs, from_u32, lit, sqrt};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock};
-use crate::refine::lm::{Manifold, Minimum, minimise};
+use crate::refine::lm::{Manifold, Minimum, NormalEquations, descend, normal_equations};
 use crate::refine::relative_pose::{PoseModel, Scales};
 use crate::robust::loss::Loss;
 use crate::robust::{Estimator, Gate, Score, ScoreCounts, Tally};
 use crate::solvers::relpose_5pt;
 
 use super::super::stride;
+use super::prior::KnownRotation;
 
 /// Correspondences and what a score of them needs.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct PoseProblem<'a, T, B> {
+pub(super) struct PoseProblem<'a, T: Real, B> {
     pub(super) data: BlockSlice<'a, B>,
     pub(super) scales: Scales<T>,
     /// The threshold in the blocks' unit.
     pub(super) threshold: T,
     /// Blocks between two that are scored one after the other.
     pub(super) stride: usize,
+    /// What is known of the rotation and enters every optimisation, and the variance of a residual that it is weighed
+    /// against.
+    pub(super) prior: Option<(KnownRotation<T>, T)>,
 }
 
 /// Blocks scored between two looks at the gate.
@@ -38,7 +42,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
     pub(super) fn new(data: BlockSlice<'a, B>, scales: Scales<T>, threshold: T) -> Self {
         let sine = threshold * lit(PARALLEL);
         let scales = Scales { parallel_sq: sine * sine, ..scales };
-        Self { data, scales, threshold, stride: stride(data.blocks.len()) }
+        Self { data, scales, threshold, stride: stride(data.blocks.len()), prior: None }
     }
 
     /// The normalised points or bearings of a correspondence; none where it is not finite.
@@ -128,7 +132,19 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         passes: u32,
         tolerance: T,
     ) -> Minimum<PoseModel<T>, T, 5> {
-        minimise(self.data, model, loss, passes, tolerance)
+        let equations = |model: &PoseModel<T>| {
+            let mut sums = normal_equations(self.data, model, loss);
+            self.add_prior(&mut sums, model);
+            sums
+        };
+        descend(model, 5, passes, tolerance, equations, PoseModel::retract)
+    }
+
+    /// Adds what is known of the rotation.
+    pub(super) fn add_prior(&self, sums: &mut NormalEquations<T, 5>, model: &PoseModel<T>) {
+        if let Some((known, variance)) = &self.prior {
+            known.add(sums, &model.rotation, *variance);
+        }
     }
 }
 
@@ -211,9 +227,9 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
 
 /// True where two of a sample's points are closer than `distance` in a view: then they say the same thing twice, or
 /// one of them is wrong.
-fn repeated<T: Real>(points: &[Vector3<T>; 5], distance: T) -> bool {
+pub(super) fn repeated<T: Real, const S: usize>(points: &[Vector3<T>; S], distance: T) -> bool {
     let limit = distance * distance;
-    for i in 1..5 {
+    for i in 1..S {
         for j in 0..i {
             // Written so that a NaN counts as repeated.
             if !((points[i] - points[j]).norm_squared() > limit) {

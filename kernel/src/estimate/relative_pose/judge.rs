@@ -15,10 +15,10 @@ use crate::linalg::LANES;
 use crate::real::{from_u32, lit, max, sqrt};
 use crate::refine::blocks::EpipolarBlock;
 use crate::refine::homography::{RotationModel, transfer_sq};
-use crate::refine::lm::Manifold;
+use crate::refine::lm::{Manifold, normal_equations};
 use crate::refine::relative_pose::PoseModel;
 use crate::robust::loss::Loss;
-use crate::robust::{Estimator, Gate, ScoreCounts};
+use crate::robust::{Consensus, Estimator, Gate, ScoreCounts};
 
 use super::super::transfer::TransferProblem;
 
@@ -51,8 +51,24 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         line_accident(self.problem.data, self.problem.threshold)
     }
 
+    /// The judgement on what a search found; writes the inlier mask, and uses `order` as memory.
+    pub(super) fn judgement(
+        &self,
+        consensus: &Consensus<PoseModel<T>, T>,
+        mask: &mut [bool],
+        order: &mut [u32],
+    ) -> Judgement<T> {
+        match &consensus.models[0] {
+            Some((model, _)) => self.verdict(model, mask, order),
+            None => {
+                mask.iter_mut().for_each(|inlier| *inlier = false);
+                Judgement { verdict: self.without_model(), noise: T::ZERO }
+            }
+        }
+    }
+
     /// The verdict where no hypothesis was found at all.
-    pub(super) fn without_model(&self) -> RelativePoseVerdict<T> {
+    fn without_model(&self) -> RelativePoseVerdict<T> {
         let all = 0..self.problem.data.count as u32;
         if few_distinct(self.problem.data, all, 5, self.sigma, self.accident()) {
             RelativePoseVerdict::Unobservable(Unobservable::TooFewDistinct)
@@ -62,7 +78,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     }
 
     /// The verdict on a pose and its runners-up; writes the inlier mask, and uses `order` as memory.
-    pub(super) fn verdict(&self, best: &PoseModel<T>, mask: &mut [bool], order: &mut [u32]) -> Judgement<T> {
+    fn verdict(&self, best: &PoseModel<T>, mask: &mut [bool], order: &mut [u32]) -> Judgement<T> {
         let problem = self.problem;
         let count = problem.data.count as u32;
         let mut refined = self.refine(best);
@@ -126,7 +142,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     }
 
     /// The pose that all inliers support, with what lies just beyond the threshold at a falling weight.
-    fn refine(&self, model: &PoseModel<T>) -> PoseModel<T> {
+    pub(super) fn refine(&self, model: &PoseModel<T>) -> PoseModel<T> {
         let loss = Loss::Tukey(self.problem.threshold * T::TWO);
         self.problem.optimise(model, &loss, 10, lit(1e-6)).model
     }
@@ -151,10 +167,13 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     }
 
     /// A refined pose with its covariance, and the noise.
-    fn motion(&self, model: &PoseModel<T>) -> (GeneralMotion<T>, T) {
+    pub(super) fn motion(&self, model: &PoseModel<T>) -> (GeneralMotion<T>, T) {
         let spread = self.spread(model);
         let loss = Loss::Truncated(self.problem.threshold * T::TWO);
-        let sums = self.problem.optimise(model, &loss, 1, T::ZERO).equations;
+        let mut sums = normal_equations(self.problem.data, model, &loss);
+        if let Some((known, _)) = &self.problem.prior {
+            known.add(&mut sums, &model.rotation, spread.variance);
+        }
         (GeneralMotion { pose: model.pose(), covariance: covariance(&sums, spread.variance) }, spread.noise)
     }
 
@@ -177,7 +196,10 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
 
     pub(super) fn cost(&self, model: &PoseModel<T>) -> T {
         let score = self.problem.score(model, &Gate::open(), &mut ScoreCounts::default());
-        score.map_or(T::MAX, |score| score.cost)
+        let prior = self.problem.prior.as_ref().map_or(T::ZERO, |(known, variance)| {
+            known.cost(&model.rotation) * *variance / (self.problem.threshold * self.problem.threshold)
+        });
+        score.map_or(T::MAX, |score| score.cost + prior)
     }
 
     /// Writes the pose's inliers and counts them.

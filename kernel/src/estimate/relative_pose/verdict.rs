@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
 
+use crate::estimate::PriorFit;
 use crate::geometry::Pose;
 use crate::robust::RansacReport;
 use crate::{Real, Solutions};
@@ -77,6 +78,8 @@ pub enum Unobservable {
 pub struct RelativePoseEstimate<T: Real> {
     /// The verdict.
     pub verdict: RelativePoseVerdict<T>,
+    /// Of a prior: whether it fits; none without one, or where the verdict knows of no rotation.
+    pub prior: Option<PriorFit<T>>,
     /// Robust estimate of the noise of one image coordinate from the inliers' residuals, pixels; 0 without inliers.
     pub noise_px: T,
     /// How the search went.

@@ -1,0 +1,353 @@
+//! The search and the verdict with something known of the rotation beforehand.
+//!
+//! Smaller samples, turned by a rotation that is known to within its uncertainty only, give poses that are off by more
+//! than the noise. So a hypothesis is first polished on a few correspondences, within a threshold as wide as the
+//! uncertainty; what finds no support there is not scored.
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+use super::super::chance::line_accident;
+use super::super::prior::PriorFit;
+use super::LEAST_INLIERS;
+use super::hypothesis::{PoseProblem, repeated};
+use super::judge::{Judge, Judgement, pose_model};
+use super::prior::KnownRotation;
+use super::verdict::RelativePoseVerdict;
+use crate::Real;
+use crate::geometry::pose::upright;
+use crate::linalg::{LANES, Ldlt};
+use crate::real::{abs, from_u32, lit, sqrt};
+use crate::refine::blocks::{BlockSlice, EpipolarBlock};
+use crate::refine::lm::{Manifold, normal_equations};
+use crate::refine::relative_pose::PoseModel;
+use crate::robust::loss::Loss;
+use crate::robust::{
+    Consensus, Estimator, Gate, Guide, Progress, RansacOptions, RansacReport, Score, ScoreCounts, StopReason,
+    iterations_needed, rank_by_score, ransac,
+};
+use crate::solvers::{relpose_upright_3pt, translation_2pt};
+
+/// Blocks of the correspondences on which hypotheses are polished.
+const SUBSET: usize = 8;
+/// Gauss-Newton steps of a hypothesis on them.
+const POLISH_PASSES: u32 = 2;
+/// Passes over the data in a local optimisation.
+const LOCAL_PASSES: u32 = 6;
+/// The wide threshold is the narrow one and so many standard deviations of the prior.
+const WIDE_SIGMAS: f64 = 1.0;
+/// Where wrong correspondences lie within the wide threshold more often than this, the prior is too vague to sample by.
+const VAGUE: f64 = 0.3;
+/// Probability with which a rival of a prior's consensus is found if there is one.
+const RIVAL_CONFIDENCE: f64 = 0.85;
+/// A smaller share of inliers is left to the search without the prior.
+const LEAST_SHARE: f64 = 0.2;
+
+/// A problem of which the rotation is known in part: `K` is what the samples need of it.
+pub(super) struct AidedProblem<'a, T: Real, B, K> {
+    problem: PoseProblem<'a, T, B>,
+    known: K,
+    /// Correspondences in a subset.
+    count: usize,
+    wide: T,
+    /// Correspondences of the subset that must lie within the wide threshold.
+    support: u32,
+}
+
+impl<'a, T: Real, B: EpipolarBlock<T>, K> AidedProblem<'a, T, B, K> {
+    /// None where the prior is too vague to sample by.
+    fn new(problem: &PoseProblem<'a, T, B>, variance: T, known: K) -> Option<Self> {
+        let wide = problem.threshold + sqrt(variance) * lit(WIDE_SIGMAS);
+        let accident = line_accident(problem.data, wide);
+        if !(accident < lit(VAGUE)) {
+            return None;
+        }
+        let count = core::cmp::min(problem.data.count / LANES, SUBSET) * LANES;
+        // Two standard deviations more than chance.
+        let n = from_u32::<T>(count as u32);
+        let chance = n * accident + T::TWO * sqrt(n * accident * (T::ONE - accident));
+        let support = core::cmp::max(chance.to_f64() as u32 + 1, 5);
+        Some(Self { problem: *problem, known, count, wide, support })
+    }
+
+    /// Some full blocks, others for another model, so that polished models stay as independent as their samples.
+    fn subset(&self, model: &PoseModel<T>) -> [B; SUBSET] {
+        let blocks = self.problem.data.blocks;
+        let full = self.problem.data.count / LANES;
+        let mut subset = [B::zero(); SUBSET];
+        let mut at = (abs(model.translation.x) * from_u32(full as u32 * 8)).to_f64() as usize
+            % core::cmp::max(full, 1);
+        for place in &mut subset {
+            // The stride is coprime to the number of all blocks, the last of which may not be full.
+            for _ in 0..2 {
+                if at >= blocks.len() {
+                    at -= blocks.len();
+                }
+                if at < full {
+                    break;
+                }
+                at += self.problem.stride;
+            }
+            if let Some(block) = blocks.get(at) {
+                *place = *block;
+            }
+            at += self.problem.stride;
+        }
+        subset
+    }
+}
+
+/// Poses of minimal samples of `S` correspondences, something being known.
+trait Minimal<T: Real, const S: usize> {
+    fn poses(
+        &self,
+        f1: &[Vector3<T>; S],
+        f2: &[Vector3<T>; S],
+        found: &mut impl FnMut(Matrix3<T>, Vector3<T>),
+    );
+}
+
+/// The turns that make both views upright.
+struct Upright<T: Real>([Matrix3<T>; 2]);
+
+impl<T: Real> Minimal<T, 3> for Upright<T> {
+    fn poses(
+        &self,
+        f1: &[Vector3<T>; 3],
+        f2: &[Vector3<T>; 3],
+        found: &mut impl FnMut(Matrix3<T>, Vector3<T>),
+    ) {
+        let [a, b] = &self.0;
+        let back = b.transpose();
+        for pose in &relpose_upright_3pt(&f1.map(|f| a * f), &f2.map(|f| b * f)) {
+            let rotation = pose.rotation.to_rotation_matrix().into_inner();
+            found(back * rotation * a, back * pose.translation.vector);
+        }
+    }
+}
+
+/// The rotation.
+struct Turned<T: Real>(UnitQuaternion<T>);
+
+impl<T: Real> Minimal<T, 2> for Turned<T> {
+    fn poses(
+        &self,
+        f1: &[Vector3<T>; 2],
+        f2: &[Vector3<T>; 2],
+        found: &mut impl FnMut(Matrix3<T>, Vector3<T>),
+    ) {
+        if let Some(translation) = translation_2pt(&self.0, f1, f2) {
+            found(self.0.to_rotation_matrix().into_inner(), translation);
+        }
+    }
+}
+
+impl<T: Real, B: EpipolarBlock<T>, K: Minimal<T, S>, const S: usize> Estimator<T, S>
+    for AidedProblem<'_, T, B, K>
+{
+    type Model = PoseModel<T>;
+
+    // A polished model is near the optimum already.
+    const NEAR_MISSES: u32 = 5;
+    // The subset is looked at twice before.
+    const SCORE_PASSES: u32 = 4;
+
+    fn count(&self) -> u32 {
+        self.problem.data.count as u32
+    }
+
+    fn generate(&self, sample: &[u32; S], found: &mut impl FnMut(&PoseModel<T>)) -> bool {
+        let (mut f1, mut f2) = ([Vector3::zeros(); S], [Vector3::zeros(); S]);
+        for ((a, b), &index) in f1.iter_mut().zip(&mut f2).zip(sample) {
+            let Some((x, y)) = self.problem.directions(index) else { return false };
+            (*a, *b) = (x, y);
+        }
+        if repeated(&f1, self.problem.threshold) || repeated(&f2, self.problem.threshold) {
+            return false;
+        }
+        let scales = self.problem.scales;
+        self.known.poses(&f1, &f2, &mut |rotation, translation| {
+            found(&PoseModel { rotation, translation, scales });
+        });
+        true
+    }
+
+    fn polish(&self, model: &PoseModel<T>, counts: &mut ScoreCounts) -> Option<PoseModel<T>> {
+        let subset = self.subset(model);
+        let data = BlockSlice { blocks: &subset, count: self.count };
+        let mut model = *model;
+        let mut threshold = self.wide;
+        // Gauss-Newton steps with a falling threshold.
+        for pass in 0..POLISH_PASSES {
+            counts.residuals += self.count as u64;
+            let mut sums = normal_equations(data, &model, &Loss::Truncated(threshold));
+            if pass == 0 && sums.active < self.support {
+                return None;
+            }
+            self.problem.add_prior(&mut sums, &model);
+            model = model.retract(&-Ldlt::new(&sums.hessian)?.solve(&sums.gradient));
+            threshold *= T::HALF;
+        }
+        Some(model)
+    }
+
+    fn score(&self, model: &PoseModel<T>, gate: &Gate<T>, counts: &mut ScoreCounts) -> Option<Score<T>> {
+        self.problem.score(model, gate, counts)
+    }
+
+    fn refine(&self, model: &PoseModel<T>, residuals: &mut u64) -> Option<PoseModel<T>> {
+        // A polished model needs no wide stage.
+        let loss = Loss::Tukey(self.problem.threshold * T::TWO);
+        let minimum = self.problem.optimise(model, &loss, LOCAL_PASSES, lit(1e-3));
+        *residuals += minimum.passes as u64 * self.problem.data.count as u64;
+        Some(minimum.model)
+    }
+}
+
+/// The consensus by smaller samples; none where the prior is too vague for them.
+fn search<T: Real, B: EpipolarBlock<T>>(
+    problem: &PoseProblem<'_, T, B>,
+    known: &KnownRotation<T>,
+    options: &RansacOptions<T>,
+    order: Option<&[u32]>,
+    keep_going: Option<&mut dyn FnMut(&Progress) -> bool>,
+) -> Option<Consensus<PoseModel<T>, T>> {
+    let count = problem.data.count as u32;
+    let least = core::cmp::max((LEAST_SHARE * count as f64) as u32, LEAST_INLIERS);
+    let mut options = *options;
+    let limit = |size: u32| {
+        core::cmp::max(iterations_needed(options.confidence, least, count, size), options.min_iterations)
+    };
+    let budget = &mut options.budget;
+    match known {
+        KnownRotation::Gravity { direction, .. } => {
+            budget.max_iterations = core::cmp::min(budget.max_iterations, limit(3));
+            let turns = Upright([upright(&direction.from)?, upright(&direction.to)?]);
+            let aided = AidedProblem::new(problem, known.variance(), turns)?;
+            Some(ransac::<T, _, 3>(&aided, &options, order, LEAST_INLIERS, keep_going))
+        }
+        KnownRotation::Rotation { rotation, .. } => {
+            budget.max_iterations = core::cmp::min(budget.max_iterations, limit(2));
+            let aided = AidedProblem::new(problem, known.variance(), Turned(*rotation))?;
+            Some(ransac::<T, _, 2>(&aided, &options, order, LEAST_INLIERS, keep_going))
+        }
+    }
+}
+
+/// A judgement with what was spent for it and what became of the prior.
+pub(super) struct Aided<T: Real> {
+    pub(super) judgement: Judgement<T>,
+    pub(super) report: RansacReport<T>,
+    pub(super) fit: Option<PriorFit<T>>,
+}
+
+/// The judgement with a prior: by smaller samples where that finds a consensus that agrees with the prior, otherwise by
+/// the search without it. The prior takes part in the refinement where it fits, and nowhere else.
+pub(super) fn judgement<T: Real, B: EpipolarBlock<T>>(
+    plain: &Judge<'_, '_, T, B>,
+    known: &KnownRotation<T>,
+    options: &RansacOptions<T>,
+    guide: Guide<'_, T>,
+    mask: &mut [bool],
+    order: &mut [u32],
+) -> Aided<T> {
+    let problem = PoseProblem { prior: Some((*known, plain.sigma * plain.sigma)), ..*plain.problem };
+    let aided = Judge { problem: &problem, sigma: plain.sigma, seed: plain.seed };
+    let Guide { scores, mut keep_going } = guide;
+    // Reborrowed, for a second search may need it.
+    let ask = keep_going.as_mut().map(|ask| &mut **ask as &mut dyn FnMut(&_) -> bool);
+    let first = search(&problem, known, options, ranked(scores, order, mask.len()), ask);
+    let mut spent = first.map_or(Progress::default(), |first| first.report.spent);
+    let mut interrupted = first.is_some_and(|first| first.report.stop == StopReason::Interrupted);
+    let confident = first.filter(|first| first.report.stop == StopReason::Confident);
+    if let Some(first) = confident {
+        let judgement = aided.judgement(&first, mask, order);
+        let fit = agreement(plain, known, &judgement);
+        if let Some(PriorFit::Fits(_)) = fit {
+            let ask = keep_going.as_mut().map(|ask| &mut **ask as &mut dyn FnMut(&_) -> bool);
+            let rival = rival(plain.problem, &first, options, ask);
+            let mut report = first.report;
+            report.spent = spent.plus(&rival.spent);
+            interrupted = rival.stop == StopReason::Interrupted;
+            if interrupted {
+                report.stop = rival.stop;
+            }
+            if !(rival.cost < first.report.cost) {
+                return Aided { judgement, report, fit };
+            }
+            spent = report.spent;
+        }
+    }
+    let mut left = *options;
+    left.budget = options.budget.less(&spent);
+    if interrupted {
+        left.budget.max_iterations = 0;
+    }
+    let second = ransac(plain.problem, &left, ranked(scores, order, mask.len()), LEAST_INLIERS, keep_going);
+    let total = |mut report: RansacReport<T>| {
+        report.spent = second.report.spent.plus(&spent);
+        report.spent.inliers = report.inliers;
+        report.stop = if interrupted { StopReason::Interrupted } else { second.report.stop };
+        report
+    };
+    // The search by smaller samples may have found the better pose nevertheless.
+    if let Some(first) = first
+        && first.report.cost < second.report.cost
+    {
+        let judgement = aided.judgement(&first, mask, order);
+        let fit = agreement(plain, known, &judgement);
+        if let Some(PriorFit::Fits(_)) = fit {
+            return Aided { judgement, report: total(first.report), fit };
+        }
+    }
+    let judgement = plain.judgement(&second, mask, order);
+    let fit = known.agreement(&judgement.verdict);
+    let judgement = match fit {
+        Some(PriorFit::Fits(_)) => aided.judgement(&second, mask, order),
+        _ => judgement,
+    };
+    Aided { judgement, report: total(second.report), fit }
+}
+
+/// A short search without the prior for a consensus half as large again: a wrong prior may have led to a pose that a part
+/// of the inliers fits by accident.
+fn rival<T: Real, B: EpipolarBlock<T>>(
+    problem: &PoseProblem<'_, T, B>,
+    found: &Consensus<PoseModel<T>, T>,
+    options: &RansacOptions<T>,
+    keep_going: Option<&mut dyn FnMut(&Progress) -> bool>,
+) -> RansacReport<T> {
+    let count = problem.data.count as u32;
+    let inliers = found.report.inliers + found.report.inliers / 2;
+    let mut options = *options;
+    options.min_iterations = 0;
+    options.budget = options.budget.less(&found.report.spent);
+    let needed =
+        if inliers < count { iterations_needed::<T>(lit(RIVAL_CONFIDENCE), inliers, count, 5) } else { 0 };
+    options.budget.max_iterations = core::cmp::min(options.budget.max_iterations, needed);
+    ransac::<T, _, 5>(problem, &options, None, inliers, keep_going).report
+}
+
+/// How the prior agrees with a judgement in which it took part: with what the same correspondences say without it.
+fn agreement<T: Real, B: EpipolarBlock<T>>(
+    plain: &Judge<'_, '_, T, B>,
+    known: &KnownRotation<T>,
+    judgement: &Judgement<T>,
+) -> Option<PriorFit<T>> {
+    match &judgement.verdict {
+        RelativePoseVerdict::General(motion) => {
+            let (motion, _) = plain.motion(&plain.refine(&pose_model(&motion.pose, plain.problem)));
+            known.agreement(&RelativePoseVerdict::General(motion))
+        }
+        verdict => known.agreement(verdict),
+    }
+}
+
+/// The order of the correspondences by their scores, in the memory given.
+pub(super) fn ranked<'a, T: Real>(
+    scores: Option<&[T]>,
+    order: &'a mut [u32],
+    count: usize,
+) -> Option<&'a [u32]> {
+    rank_by_score(scores?, order);
+    order.get(..count)
+}
