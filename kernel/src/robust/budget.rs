@@ -10,7 +10,8 @@ use crate::real::{is_finite, lit};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct RansacOptions<T> {
-    /// Probability, in (0, 1), that a sample of inliers only has been drawn when the run stops by itself.
+    /// Probability, in (0, 1), that a sample of inliers only has been drawn when the run stops by itself. A relative
+    /// pose takes up to five times as many samples, until three of them have led to the same best optimum.
     /// Default 0.999.
     pub confidence: T,
     /// Iterations made at the least, so that one lucky sample does not end the run. Default 20.
@@ -114,7 +115,8 @@ pub(crate) fn check_noise<T: Real>(max_error_px: T, sigma_px: Option<T>) -> Resu
 
 /// What a caller may know or want to decide during a run; [`Guide::none`] for neither.
 pub struct Guide<'a, T> {
-    /// One number a correspondence, lower is better (a descriptor distance or ratio): samples are drawn best first.
+    /// One number a correspondence, lower is better (a descriptor distance or ratio): every other sample is drawn best
+    /// first.
     /// NaN ranks last.
     pub scores: Option<&'a [T]>,
     /// "May I go on?", asked before every [`Guide::INTERVAL`]-th iteration, the first excepted.

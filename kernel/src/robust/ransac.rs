@@ -14,8 +14,10 @@ pub const KEPT: usize = 4;
 /// A sample's best hypothesis is optimised where it explains this share of what the best minimal model does: the
 /// best minimal model need not lie in the best basin.
 const SLACK: f64 = 0.7;
-/// Beyond [`Estimator::NEAR_MISSES`], near misses are optimised once in as many iterations.
-const NEAR_MISS_INTERVAL: u32 = 32;
+/// Until the best optimum has been met [`Estimator::DISCOVERIES`] times, the run lasts so many times as long.
+const PATIENCE: u32 = 5;
+/// Optima whose costs differ by less than this share of the correspondences count as the same one.
+const SAME_OPTIMUM: f64 = 0.003;
 
 /// What a run found: models after local optimisation, best first, and how it went.
 #[derive(Clone, Copy, Debug)]
@@ -30,7 +32,10 @@ pub struct Consensus<M, T> {
 /// The consensus of an estimator's correspondences.
 ///
 /// The best hypothesis of a sample is optimised locally where it comes near the best minimal model so far; the run
-/// ends once samples enough for the inliers of the best optimised model have been drawn.
+/// ends once samples enough for the inliers of the best optimised model have been drawn. Where samples lead to different
+/// optima, one sample of inliers is not enough: until [`Estimator::DISCOVERIES`] of them have led to the best one, five
+/// times as many samples are asked for. With an order, ranked and uniform samples alternate: the best ranked ones may lie
+/// close together.
 ///
 /// # Input
 /// `order` maps the ranks of ranked sampling to correspondences; without it samples are uniform. `least_inliers` is
@@ -105,10 +110,8 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
     let count = estimator.count();
     let size = S as u32;
     let all = from_u32::<T>(count);
-    let mut sampler: Sampler<T> = match order {
-        Some(_) => Sampler::ranked(options.seed, count, size),
-        None => Sampler::uniform(options.seed, count),
-    };
+    let mut uniform = Sampler::<T>::uniform(options.seed, count);
+    let mut ranked = Sampler::<T>::ranked(options.seed, count, size);
     let mut models: [Option<(E::Model, Score<T>)>; KEPT] = [None; KEPT];
     let mut spent = Progress::default();
     let mut counts = ScoreCounts::default();
@@ -116,6 +119,8 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
     let mut minimal_cost = T::MAX;
     let mut minimal_inliers = 0;
     let mut needed = u32::MAX;
+    let mut discoveries = 0;
+    let same = all * lit(SAME_OPTIMUM);
     let mut gate = gate::<T>(T::MAX, least_inliers, count, &counts);
     let budget = options.budget;
     // What may be spent when another hypothesis is looked at, and whether more has been.
@@ -125,7 +130,8 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
     let mut stop = StopReason::MaxIterations;
 
     while spent.iterations < budget.max_iterations {
-        if spent.iterations >= core::cmp::max(needed, options.min_iterations) {
+        let patience = if discoveries < E::DISCOVERIES { PATIENCE } else { 1 };
+        if spent.iterations >= core::cmp::max(needed.saturating_mul(patience), options.min_iterations) {
             stop = StopReason::Confident;
             break;
         }
@@ -145,6 +151,9 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
             stop = StopReason::Interrupted;
             break;
         }
+        // Ranked samples first, and every other time.
+        let order = if spent.iterations.is_multiple_of(2) { order } else { None };
+        let sampler = if order.is_some() { &mut ranked } else { &mut uniform };
         let Some(mut sample) = sampler.sample::<S>(spent.iterations) else { break };
         spent.iterations += 1;
         if let Some(order) = order {
@@ -155,7 +164,7 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
 
         // Near misses are optimised too, at a bounded rate.
         let near = minimal_cost < T::MAX
-            && spent.refinements < E::NEAR_MISSES + spent.iterations / NEAR_MISS_INTERVAL;
+            && spent.refinements < E::NEAR_MISSES + spent.iterations / E::NEAR_MISS_INTERVAL;
         let bound = if near { all - (all - minimal_cost) * lit(SLACK) } else { minimal_cost };
         let mut leader: Option<(E::Model, Score<T>)> = None;
         let mut hypotheses = 0;
@@ -197,6 +206,11 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
         if leads && estimator.reject(&candidate.0) {
             continue;
         }
+        discoveries = match models[0] {
+            Some((_, best)) if candidate.1.cost > best.cost + same => discoveries,
+            Some((_, best)) if candidate.1.cost > best.cost - same => discoveries + 1,
+            _ => 1,
+        };
         keep(&mut models, candidate);
         if leads {
             spent.inliers = candidate.1.inliers;

@@ -1,6 +1,6 @@
 //! Which of the simpler models (no motion, a rotation, a plane) the inliers of a relative pose leave standing.
 //!
-//! A simpler model is given up where the data prove parallax against it, in one of two ways or both together.
+//! A simpler model is given up where the data prove parallax against it, in one of these ways, the first two also together.
 //!
 //! By count: correspondences that it leaves unexplained agree with the pose more often than chance. Of `m` unexplained
 //! ones `k` agree; a wrong one agrees with the probability `p`, the share of the image within the threshold of an
@@ -9,6 +9,9 @@
 //!
 //! By scatter: on the correspondences that it does explain, the squared error across the epipolar lines is what noise
 //! is, and the one along them must not be larger: the logarithm of the ratio of both has a known deviation.
+//!
+//! By fit: on what a plane explains, the epipolar lines of the pose must not fit far better than those of the plane's
+//! own motion, a likelihood ratio with five degrees of freedom.
 //!
 //! # References
 //! L. Moisan, B. Stival, "A probabilistic criterion to detect rigid point matches between two images", IJCV 2004 (the
@@ -23,7 +26,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::Real;
 use crate::geometry::pose::nearest_rotation;
 use crate::linalg::LANES;
-use crate::real::{from_u32, lit, ln, max, sqrt};
+use crate::real::{from_u32, lit, ln, max, min, sqrt};
 use crate::refine::blocks::EpipolarBlock;
 use crate::refine::homography::{RotationModel, transfer_sq};
 use crate::refine::lm::Manifold;
@@ -31,6 +34,9 @@ use crate::refine::relative_pose::PoseModel;
 
 use super::super::chance::{EXPLAINED_SIGMAS, beyond_chance_with};
 use super::hypothesis::PoseProblem;
+
+/// Chi-squared of five degrees of freedom exceeds this once in 5,000 times.
+const CHANCE_GAIN: f64 = 24.0;
 
 /// How a simpler model explains the inliers of a pose.
 #[derive(Clone, Copy, Debug)]
@@ -102,6 +108,27 @@ impl<T: Real, B: EpipolarBlock<T>> Evidence<'_, '_, T, B> {
             if along > across { ln(along / across) * sqrt(from_u32(n)) * T::HALF } else { T::ZERO };
         let unexplained = count.saturating_sub(n);
         beyond_chance_with(unexplained, explained.others, 2, self.accident, deviations)
+    }
+
+    /// True where the pose's epipolar lines fit what `x2 ~ H x1` explains far better than those of the plane's own pose
+    /// `twin` do: the pose has five parameters to fit noise with, the twin follows from the plane.
+    pub(super) fn bends(&self, h: &Matrix3<T>, twin: &Matrix3<T>, noise: T) -> bool {
+        let limit: T = lit(EXPLAINED_SIGMAS * EXPLAINED_SIGMAS);
+        let scale = T::ONE / (self.sigma * self.sigma);
+        let mut gain = T::ZERO;
+        let mut mask = self.inliers.iter();
+        for block in self.problem.data.blocks {
+            let (plane, mut weight) = block.planes();
+            weight.iter_mut().for_each(|w| *w *= scale);
+            let squared = transfer_sq(h, &plane, &weight);
+            let ((c, d), (e, f)) = (block.residual(twin), block.residual(&self.epipolar));
+            for (l, _) in (0..LANES).zip(mask.by_ref()) {
+                if squared[l] < limit {
+                    gain += min(c[l] * c[l] * scale / d[l], limit) - min(e[l] * e[l] * scale / f[l], limit);
+                }
+            }
+        }
+        gain * self.sigma * self.sigma > lit::<T>(CHANCE_GAIN) * noise * noise
     }
 
     /// The rotation that explains the inliers best, by alternating between the closest rotation of all that are

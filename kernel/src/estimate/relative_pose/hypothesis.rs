@@ -35,6 +35,8 @@ const CHUNK: usize = 2;
 /// Passes over the data in the two stages of a local optimisation.
 const WIDE_PASSES: u32 = 5;
 const LOCAL_PASSES: u32 = 10;
+/// The first stage's threshold over the second's.
+const WIDE: f64 = 3.0;
 /// Rays closer to parallel than this many thresholds say nothing about depth.
 const PARALLEL: f64 = 1.0;
 
@@ -157,6 +159,9 @@ struct View<T: Real> {
 impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
     type Model = PoseModel<T>;
 
+    const DISCOVERIES: u32 = 3;
+    const NEAR_MISS_INTERVAL: u32 = 8;
+
     fn count(&self) -> u32 {
         self.data.count as u32
     }
@@ -215,8 +220,8 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
     }
 
     fn refine(&self, model: &PoseModel<T>, residuals: &mut u64) -> Option<PoseModel<T>> {
-        // A minimal model is off by more than the noise: inliers are gathered from twice the threshold first.
-        let wide = Loss::Truncated(self.threshold * T::TWO);
+        // A minimal model is off by more than the noise: inliers are gathered from three times the threshold first.
+        let wide = Loss::Truncated(self.threshold * lit(WIDE));
         let first = self.optimise(model, &wide, WIDE_PASSES, lit(1e-3));
         let loss = Loss::Truncated(self.threshold);
         let minimum = self.optimise(&first.model, &loss, LOCAL_PASSES, lit(1e-4));

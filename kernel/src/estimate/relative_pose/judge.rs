@@ -134,7 +134,11 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
             let evidence = Evidence { problem, inliers: mask, epipolar, sigma, accident };
             let explained = evidence.explained(&plane.0);
             let share = explained.inliers * 20 >= (explained.inliers + explained.others) * PLANE_SHARE_OF_20;
-            if share && !evidence.proves_parallax(count, &explained, 8) && !twins.is_empty() {
+            let plane_stands = twins.first().is_some_and(|twin| {
+                let twin = pose_model(&twin.pose, problem).matrix();
+                !evidence.bends(&plane.0, &twin, max(noise, sigma * T::HALF))
+            });
+            if share && plane_stands && !evidence.proves_parallax(count, &explained, 8) {
                 return self.planar(&plane, twins, sigma, mask);
             }
         }
