@@ -7,22 +7,20 @@ use epipole::geometry::Pose;
 use epipole::nalgebra::Vector3;
 use epipole::solvers;
 
+/// The first `N` vectors of an array of rows, where they lie.
+///
 /// # Safety
-/// `p` points to `3 * N` numbers.
-unsafe fn vectors<T: Real, const N: usize>(p: *const T) -> [Vector3<T>; N] {
-    let p = unsafe { slice::from_raw_parts(p, 3 * N) };
-    core::array::from_fn(|i| Vector3::new(p[3 * i], p[3 * i + 1], p[3 * i + 2]))
+/// `p` points to `3 * N` numbers that live as long as the result.
+pub(crate) unsafe fn vectors<'a, T: Real, const N: usize>(p: *const T) -> &'a [Vector3<T>; N] {
+    // SAFETY: a vector is its three numbers, one after the other, and nothing else.
+    unsafe { &*p.cast() }
 }
 
 /// Writes R row-major, then t.
 pub(crate) fn write_pose<T: Real>(pose: &Pose<T>, out: &mut [T]) {
-    let r = pose.rotation.to_rotation_matrix().into_inner();
-    for i in 0..3 {
-        for j in 0..3 {
-            out[3 * i + j] = r[(i, j)];
-        }
-        out[9 + i] = pose.translation.vector[i];
-    }
+    let Some(out) = out.first_chunk_mut::<12>() else { return };
+    let (r, t) = (pose.rotation.to_rotation_matrix().into_inner(), pose.translation.vector);
+    *out = [r.m11, r.m12, r.m13, r.m21, r.m22, r.m23, r.m31, r.m32, r.m33, t.x, t.y, t.z];
 }
 
 /// Writes poses one after the other; how many there were.
@@ -43,7 +41,7 @@ macro_rules! export {
         /// `a` and `b` point to 3x3 numbers, `out` to room for four poses of 12.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $name(a: *const $t, b: *const $t, out: *mut $t) -> i32 {
-            unsafe { write_poses(&$solver(&vectors(a), &vectors(b)), out) }
+            unsafe { write_poses(&$solver(vectors(a), vectors(b)), out) }
         }
     )*};
 }

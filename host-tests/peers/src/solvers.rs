@@ -7,15 +7,7 @@ use epipole::geometry::{Essential, Pose};
 use epipole::nalgebra::{Matrix3, Vector3};
 use epipole::{Real, solvers};
 
-/// The first `N` bearings of an array of rows.
-///
-/// # Safety
-/// `p` points to at least `3 N` scalars.
-unsafe fn bearings<T: Real, const N: usize>(p: *const T) -> [Vector3<T>; N] {
-    // SAFETY: as the caller promises.
-    let p = unsafe { slice::from_raw_parts(p, 3 * N) };
-    std::array::from_fn(|i| Vector3::new(p[3 * i], p[3 * i + 1], p[3 * i + 2]))
-}
+use crate::poses::{vectors, write_pose};
 
 /// Writes matrices row-major, one after the other; how many there were.
 ///
@@ -24,10 +16,9 @@ unsafe fn bearings<T: Real, const N: usize>(p: *const T) -> [Vector3<T>; N] {
 unsafe fn put<T: Real>(out: *mut T, matrices: impl IntoIterator<Item = Matrix3<T>>) -> i32 {
     let mut count = 0;
     for m in matrices {
-        for (k, v) in m.transpose().iter().enumerate() {
-            // SAFETY: as the caller promises.
-            unsafe { *out.add(9 * count + k) = *v };
-        }
+        let rows = [m.m11, m.m12, m.m13, m.m21, m.m22, m.m23, m.m31, m.m32, m.m33];
+        // SAFETY: as the caller promises.
+        unsafe { *out.add(9 * count).cast() = rows };
         count += 1;
     }
     count as i32
@@ -40,11 +31,8 @@ unsafe fn put<T: Real>(out: *mut T, matrices: impl IntoIterator<Item = Matrix3<T
 unsafe fn put_poses<T: Real>(out: *mut T, poses: impl IntoIterator<Item = Pose<T>>) -> i32 {
     let mut count = 0;
     for pose in poses {
-        let r = pose.rotation.to_rotation_matrix().into_inner().transpose();
-        for (k, v) in r.iter().chain(pose.translation.vector.iter()).enumerate() {
-            // SAFETY: as the caller promises.
-            unsafe { *out.add(12 * count + k) = *v };
-        }
+        // SAFETY: as the caller promises.
+        write_pose(&pose, unsafe { slice::from_raw_parts_mut(out.add(12 * count), 12) });
         count += 1;
     }
     count as i32
@@ -86,23 +74,23 @@ export! {
 
 unsafe fn relpose_5pt<T: Real>(a: *const T, b: *const T, out: *mut T) -> i32 {
     // SAFETY: five bearings each, at most ten solutions.
-    unsafe { put(out, solvers::relpose_5pt(&bearings(a), &bearings(b)).into_iter().map(|e| e.0)) }
+    unsafe { put(out, solvers::relpose_5pt(vectors(a), vectors(b)).into_iter().map(|e| e.0)) }
 }
 
 unsafe fn relpose_5pt_poses<T: Real>(a: *const T, b: *const T, out: *mut T) -> i32 {
     // SAFETY: five bearings each, at most ten solutions.
-    unsafe { put_poses(out, solvers::relpose_5pt_poses(&bearings(a), &bearings(b))) }
+    unsafe { put_poses(out, solvers::relpose_5pt_poses(vectors(a), vectors(b))) }
 }
 
 unsafe fn relpose_7pt<T: Real>(a: *const T, b: *const T, out: *mut T) -> i32 {
     // SAFETY: seven bearings each, at most three solutions.
-    unsafe { put(out, solvers::relpose_7pt(&bearings(a), &bearings(b)).into_iter().map(|f| f.0)) }
+    unsafe { put(out, solvers::relpose_7pt(vectors(a), vectors(b)).into_iter().map(|f| f.0)) }
 }
 
 unsafe fn relpose_8pt<T: Real, const N: usize>(a: *const T, b: *const T, out: *mut T) -> i32 {
     // SAFETY: N bearings each, at most one solution.
     unsafe {
-        let e = solvers::relpose_8pt(&bearings::<T, N>(a), &bearings::<T, N>(b));
+        let e = solvers::relpose_8pt(vectors::<T, N>(a), vectors::<T, N>(b));
         put(out, e.ok().flatten().map(|e| e.0))
     }
 }
@@ -119,16 +107,16 @@ unsafe fn relpose_8pt_of_20<T: Real>(a: *const T, b: *const T, out: *mut T) -> i
 
 unsafe fn homography_4pt<T: Real>(a: *const T, b: *const T, out: *mut T) -> i32 {
     // SAFETY: four bearings each, at most one solution.
-    unsafe { put(out, solvers::homography_4pt(&bearings(a), &bearings(b)).map(|h| h.0)) }
+    unsafe { put(out, solvers::homography_4pt(vectors(a), vectors(b)).map(|h| h.0)) }
 }
 
 /// An essential matrix, row-major, and five bearings of each view, to the pose that has all of them in front.
 unsafe fn pose_by_cheirality<T: Real>(a: *const T, b: *const T, out: *mut T) -> i32 {
     // SAFETY: as the caller promises.
     let (e, x1, x2) =
-        unsafe { (slice::from_raw_parts(a, 9), bearings::<T, 5>(b), bearings::<T, 5>(b.add(15))) };
+        unsafe { (slice::from_raw_parts(a, 9), vectors::<T, 5>(b), vectors::<T, 5>(b.add(15))) };
     let e = Essential(Matrix3::from_row_slice(e));
-    let pose = e.pose_by_cheirality(&x1, &x2).filter(|p| p.in_front == 5).map(|p| p.pose);
+    let pose = e.pose_by_cheirality(x1, x2).filter(|p| p.in_front == 5).map(|p| p.pose);
     // SAFETY: at most one pose.
     unsafe { put_poses(out, pose) }
 }
@@ -144,10 +132,10 @@ unsafe fn triangulate<T: Real>(
     method: impl FnOnce(&ViewPair<T>, &Vector3<T>, &Vector3<T>) -> Triangulation<T>,
 ) -> i32 {
     // SAFETY: as the caller promises.
-    let ([x1, x2], pose) = unsafe { (bearings(a), slice::from_raw_parts(b, 12)) };
+    let ([x1, x2], pose) = unsafe { (vectors(a), slice::from_raw_parts(b, 12)) };
     let t = Vector3::new(pose[9], pose[10], pose[11]);
     let views = ViewPair::from_parts(&Matrix3::from_row_slice(&pose[..9]), &t);
-    let (Triangulation::Point(point) | Triangulation::Behind { point, .. }) = method(&views, &x1, &x2) else {
+    let (Triangulation::Point(point) | Triangulation::Behind { point, .. }) = method(&views, x1, x2) else {
         return 0;
     };
     for (k, v) in point.iter().enumerate() {
