@@ -121,8 +121,9 @@ impl<T: Real> Essential<T> {
     /// `u3` and about `v3`: no frame is formed.
     ///
     /// # Returns
-    /// `None` where E is not finite or its rank is below 2. The rotations are orthogonal to a few `EPSILON` whatever E;
-    /// of a matrix that is not quite essential they are one of the pairs near it (see [`Self::nearest`] for the best).
+    /// `None` where E is not finite or its rank is below 2. The rotations are orthogonal to a few `EPSILON`
+    /// where the third singular value is zero to rounding, whatever the first two; else off by its share of them (take
+    /// [`Self::nearest`] first).
     ///
     /// # Accuracy
     /// A few `EPSILON` radians, `f32` and `f64`.
@@ -140,19 +141,22 @@ impl<T: Real> Essential<T> {
         let u = add(&add(&cofactors[0], &cofactors[1]), &cofactors[2]);
         let v = Vector3::new(cofactors[0].dot(&u), cofactors[1].dot(&u), cofactors[2].dot(&u));
         let (u_sq, v_sq) = (u.norm_squared(), v.norm_squared());
-        let (u3, v3) = (u * (T::ONE / sqrt(u_sq)), v * (T::ONE / sqrt(v_sq)));
+        let (u_inverse, v_norm) = (T::ONE / sqrt(u_sq), sqrt(v_sq));
+        let (u3, v3) = (u * u_inverse, v * (T::ONE / v_norm));
+        // (s1 + s2)^2 = s1^2 + s2^2 + 2 s1 s2, and the cofactors map u3 to s1 s2 v3.
+        let size = m.norm_squared();
+        let scale = T::ONE / sqrt(size + T::TWO * (v_norm * u_inverse));
         // -[u3]x E - E [v3]x = (s1 + s2) (u1 v2' - u2 v1'), whatever s1 and s2.
         let turn = Matrix3::from_columns(&[
             a.cross(&u3) - b * v3.z + c * v3.y,
             b.cross(&u3) - c * v3.x + a * v3.z,
             c.cross(&u3) - a * v3.y + b * v3.x,
         ]);
-        let turn = turn * (lit::<T>(core::f64::consts::SQRT_2) / sqrt(turn.norm_squared()));
+        let turn = turn * scale;
         let axis = u3 * v3.transpose();
         let rotations = [axis + turn, axis - turn];
         // What rounding leaves of a second singular value that is zero; false for NaN, too.
         let tolerance = lit::<T>(16.0) * T::EPSILON;
-        let size = m.norm_squared();
         let full = u_sq > tolerance * tolerance * size * size && v_sq > T::ZERO;
         full.then_some(TwistedPair { rotations, t: u3 })
     }
