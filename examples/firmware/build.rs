@@ -32,6 +32,12 @@ fn main() {
         _ => None,
     };
     println!("cargo:rustc-check-cfg=cfg(qemu_arm, small_ram)");
+    println!("cargo:rustc-check-cfg=cfg(uart, values(\"cmsdk\", \"ns16550\"))");
+    match layout {
+        "mps2-an386" => println!("cargo:rustc-cfg=uart=\"cmsdk\""),
+        "virt" => println!("cargo:rustc-cfg=uart=\"ns16550\""),
+        _ => (),
+    }
     if board == "microbit" {
         println!("cargo:rustc-cfg=small_ram");
     }

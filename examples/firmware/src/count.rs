@@ -16,8 +16,20 @@ pub fn measure<R>(call: impl FnOnce() -> R) -> (R, u64) {
 /// What [`measure`] itself costs.
 static EMPTY: AtomicU32 = AtomicU32::new(0);
 
+/// Microseconds since the machine started, by its own clock; [`init`] comes first.
+#[cfg(any(qemu_arm, uart = "ns16550"))]
+pub fn micros() -> u64 {
+    counter::micros()
+}
+
 #[cfg(target_arch = "riscv32")]
 mod counter {
+    /// QEMU's virt counts time at 10 MHz.
+    #[cfg(uart = "ns16550")]
+    pub(super) fn micros() -> u64 {
+        riscv::register::time::read64() / 10
+    }
+
     /// Instructions retired since reset.
     pub(super) fn now() -> u64 {
         riscv::register::minstret::read64()
@@ -72,6 +84,10 @@ mod counter {
     pub(super) fn cost(start: u64, end: u64) -> u64 {
         const TENTHS_NS: u64 = tenths(env!("TICK_NS"));
         ((end - start) * TENTHS_NS + 640) / 1280
+    }
+
+    pub(super) fn micros() -> u64 {
+        now() * tenths(env!("TICK_NS")) / 10_000
     }
 
     /// Tenths of a number like "62.5".

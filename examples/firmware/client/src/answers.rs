@@ -1,12 +1,14 @@
 //! What the library answers here: the bits that a server's answer must have.
 
 use epipole::estimate::{
-    WideAbsolutePoseStorage, WideTwoViewStorage, absolute_pose_guided, relative_pose_guided,
+    AbsolutePoseEstimate, RelativePoseEstimate, WideAbsolutePoseStorage, WideTwoViewStorage,
+    absolute_pose_guided, relative_pose_guided,
 };
 use epipole::nalgebra::{Vector2, Vector3};
 use epipole::robust::{Guide, RansacOptions, RansacReport, StopReason};
 use epipole_wire::{
-    Decoder, Frame, Reply, Request, absolute_pose_reply, encoded_len, relative_pose_reply, reply_bytes,
+    AbsolutePoseRequest, Decoder, Frame, RelativePoseRequest, Reply, Request, absolute_pose_reply,
+    encoded_len, relative_pose_reply, reply_bytes,
 };
 
 /// The most correspondences of a request.
@@ -37,42 +39,74 @@ impl Library {
         let length = match (Request::parse(request).ok()?, reply) {
             (Request::RelativePose(mut asked), Reply::RelativePose(reply)) => {
                 cut_off(&mut asked.options.ransac, &reply.estimate.report);
-                let records: Vec<_> = asked.correspondences.iter().collect();
-                let x1: Vec<_> = records.iter().map(|([u, v, ..], _)| Vector2::new(*u, *v)).collect();
-                let x2: Vec<_> = records.iter().map(|([.., u, v], _)| Vector2::new(*u, *v)).collect();
-                let scores: Vec<_> = records.iter().map(|(_, score)| *score).collect();
-                let guide =
-                    Guide { scores: asked.correspondences.scored().then_some(&scores[..]), keep_going: None };
-                let mut workspace = self.two_view.workspace();
-                let [a, b] = &asked.cameras;
-                let mut estimate =
-                    relative_pose_guided(a, b, &x1, &x2, &asked.options, guide, &mut workspace).ok()?;
+                let (mut estimate, inliers) = self.relative(&asked)?;
                 restore(&mut estimate.report, &reply.estimate.report);
-                let (order, time, inliers) = (reply.order, reply.elapsed_us, workspace.inliers());
-                relative_pose_reply(&mut out, request.sequence, order, time, &estimate, inliers).ok()?
+                let (order, time) = (reply.order, reply.elapsed_us);
+                relative_pose_reply(&mut out, request.sequence, order, time, &estimate, &inliers).ok()?
             }
             (Request::AbsolutePose(mut asked), Reply::AbsolutePose(reply)) => {
                 cut_off(&mut asked.options.ransac, &reply.estimate.report);
-                let records: Vec<_> = asked.correspondences.iter().collect();
-                let pixels: Vec<_> = records.iter().map(|([u, v, ..], _)| Vector2::new(*u, *v)).collect();
-                let points: Vec<_> =
-                    records.iter().map(|([.., x, y, z], _)| Vector3::new(*x, *y, *z)).collect();
-                let scores: Vec<_> = records.iter().map(|(_, score)| *score).collect();
-                let guide =
-                    Guide { scores: asked.correspondences.scored().then_some(&scores[..]), keep_going: None };
-                let mut workspace = self.absolute.workspace();
-                let camera = &asked.camera;
-                let mut estimate =
-                    absolute_pose_guided(camera, &pixels, &points, &asked.options, guide, &mut workspace)
-                        .ok()?;
+                let (mut estimate, inliers) = self.absolute(&asked)?;
                 restore(&mut estimate.report, &reply.estimate.report);
-                let (order, time, inliers) = (reply.order, reply.elapsed_us, workspace.inliers());
-                absolute_pose_reply(&mut out, request.sequence, order, time, &estimate, inliers).ok()?
+                let (order, time) = (reply.order, reply.elapsed_us);
+                absolute_pose_reply(&mut out, request.sequence, order, time, &estimate, &inliers).ok()?
             }
             _ => return None,
         };
         out.truncate(length);
         Some(out)
+    }
+}
+
+impl Library {
+    /// Whether the library refuses the correspondences or the options of a request.
+    pub fn refuses(&mut self, request: &Frame<'_>) -> bool {
+        match Request::parse(request) {
+            Ok(Request::RelativePose(mut asked)) => {
+                asked.options.ransac.budget.max_iterations =
+                    asked.options.ransac.budget.max_iterations.min(1);
+                self.relative(&asked).is_none()
+            }
+            Ok(Request::AbsolutePose(mut asked)) => {
+                asked.options.ransac.budget.max_iterations =
+                    asked.options.ransac.budget.max_iterations.min(1);
+                self.absolute(&asked).is_none()
+            }
+            _ => false,
+        }
+    }
+
+    fn relative(
+        &mut self,
+        asked: &RelativePoseRequest<'_>,
+    ) -> Option<(RelativePoseEstimate<f32>, Vec<bool>)> {
+        let records: Vec<_> = asked.correspondences.iter().collect();
+        let x1: Vec<_> = records.iter().map(|([u, v, ..], _)| Vector2::new(*u, *v)).collect();
+        let x2: Vec<_> = records.iter().map(|([.., u, v], _)| Vector2::new(*u, *v)).collect();
+        let scores: Vec<_> = records.iter().map(|(_, score)| *score).collect();
+        let scores = asked.correspondences.scored().then_some(&scores[..]);
+        let guide = Guide { scores, keep_going: None };
+        let mut workspace = self.two_view.workspace();
+        let [a, b] = &asked.cameras;
+        let estimate = relative_pose_guided(a, b, &x1, &x2, &asked.options, guide, &mut workspace).ok()?;
+        Some((estimate, workspace.inliers().to_vec()))
+    }
+
+    fn absolute(
+        &mut self,
+        asked: &AbsolutePoseRequest<'_>,
+    ) -> Option<(AbsolutePoseEstimate<f32>, Vec<bool>)> {
+        let records: Vec<_> = asked.correspondences.iter().collect();
+        let pixels: Vec<_> = records.iter().map(|([u, v, ..], _)| Vector2::new(*u, *v)).collect();
+        let points: Vec<_> = records.iter().map(|([.., x, y, z], _)| Vector3::new(*x, *y, *z)).collect();
+        let scores: Vec<_> = records.iter().map(|(_, score)| *score).collect();
+        let scores = asked.correspondences.scored().then_some(&scores[..]);
+        let guide = Guide { scores, keep_going: None };
+        let mut workspace = self.absolute.workspace();
+        let options = &asked.options;
+        let estimate =
+            absolute_pose_guided(&asked.camera, &pixels, &points, options, guide, &mut workspace).ok()?;
+        Some((estimate, workspace.inliers().to_vec()))
     }
 }
 

@@ -4,4 +4,5 @@
 
 pub mod answers;
 pub mod damage;
+pub mod files;
 pub mod problems;

@@ -1,8 +1,8 @@
 //! Requests about scenes with known answers.
 
-use epipole::estimate::{AbsolutePoseOptions, GravityPrior, RelativePoseOptions};
+use epipole::estimate::{AbsolutePoseOptions, GravityPrior, RelativePoseOptions, RelativePosePrior};
 use epipole::geometry::{BrownConrady, Camera, KannalaBrandt, Pinhole};
-use epipole::nalgebra::{Vector2, Vector3};
+use epipole::nalgebra::{Matrix3, Vector2, Vector3};
 use epipole_problems::two_view::FOCAL;
 use epipole_problems::{Geometry, TwoView};
 use epipole_wire::{absolute_pose_request, encoded_len, relative_pose_request, request_bytes};
@@ -50,6 +50,16 @@ pub fn synthetic(k: u32, sequence: u16, most: usize, max_iterations: u32) -> Vec
         let mut options = RelativePoseOptions::default();
         options.ransac.budget.max_iterations = max_iterations;
         options.ransac.seed = u64::from(k);
+        let rotation = scene.pose::<f32>().rotation;
+        options.prior = match k % 6 {
+            1 => Some(RelativePosePrior::Gravity {
+                view1: Vector3::y(),
+                view2: rotation * Vector3::y(),
+                sigma_rad: 0.01,
+            }),
+            2 => Some(RelativePosePrior::Rotation { rotation, covariance: Matrix3::identity() * 1e-4 }),
+            _ => None,
+        };
         relative_pose_request(&mut out, sequence, [&camera; 2], [x1, x2], scores, &options, 0)
     };
     out.truncate(length.expect("there is room"));

@@ -106,6 +106,13 @@ impl<'m, U: Read + ReadReady + Write, P: OutputPin, C: Clock> Server<'m, U, P, C
         self.statistics
     }
 
+    /// Whether a frame has begun: then [`poll`](Self::poll) should be called before the pause in it is too long, even
+    /// if no byte comes.
+    #[must_use]
+    pub fn pending(&self) -> bool {
+        self.decoder.pending()
+    }
+
     /// Gives the line, the pin and the clock back.
     pub fn release(self) -> (U, P, C) {
         (self.line, self.ready, self.clock)
@@ -302,6 +309,7 @@ fn relative(
         Ok(estimate) => Ok((estimate, count)),
         Err(TwoViewError::Input(error)) => Err(Reason::Input(error)),
         Err(TwoViewError::Options(error)) => Err(Reason::Options(error)),
+        Err(TwoViewError::Prior) => Err(Reason::Prior),
         Err(_) => Err(UNKNOWN),
     }
 }
@@ -333,7 +341,7 @@ fn absolute(
         Ok(estimate) => Ok((estimate, count)),
         Err(AbsolutePoseError::Input(error)) => Err(Reason::Input(error)),
         Err(AbsolutePoseError::Options(error)) => Err(Reason::Options(error)),
-        Err(AbsolutePoseError::Gravity) => Err(Reason::Gravity),
+        Err(AbsolutePoseError::Gravity) => Err(Reason::Prior),
         Err(_) => Err(UNKNOWN),
     }
 }

@@ -57,8 +57,8 @@ pub enum Reason {
     Input(InputError),
     /// The estimator's: an option is out of range.
     Options(OptionsError),
-    /// The estimator's: the gravity prior cannot be used.
-    Gravity,
+    /// The estimator's: the prior cannot be used.
+    Prior,
     /// One that a later version knows.
     Other {
         /// Its code.
@@ -86,7 +86,7 @@ impl Reason {
             Self::Options(OptionsError::Sigma) => (14, 0, 0),
             Self::Options(OptionsError::Confidence) => (15, 0, 0),
             Self::Options(OptionsError::NoIterations) => (16, 0, 0),
-            Self::Gravity => (17, 0, 0),
+            Self::Prior => (17, 0, 0),
             Self::Other { code } => (code, 0, 0),
             Self::Input(_) | Self::Options(_) => (254, 0, 0),
         }
@@ -111,7 +111,7 @@ impl Reason {
             14 => Self::Options(OptionsError::Sigma),
             15 => Self::Options(OptionsError::Confidence),
             16 => Self::Options(OptionsError::NoIterations),
-            17 => Self::Gravity,
+            17 => Self::Prior,
             code => Self::Other { code },
         }
     }
@@ -130,7 +130,7 @@ impl fmt::Display for Reason {
             Self::Camera { which } => write!(f, "camera {which} is none"),
             Self::Input(error) => error.fmt(f),
             Self::Options(error) => error.fmt(f),
-            Self::Gravity => f.write_str("the gravity prior cannot be used"),
+            Self::Prior => f.write_str("the prior cannot be used"),
             Self::Other { code } => write!(f, "reason {code}"),
         }
     }

@@ -2,7 +2,7 @@
 
 use epipole::Solutions;
 use epipole::estimate::{
-    AbsolutePose, AbsolutePoseEstimate, AbsolutePoseVerdict, GeneralMotion, GravityFit, PlanarPose,
+    AbsolutePose, AbsolutePoseEstimate, AbsolutePoseVerdict, GeneralMotion, PlanarPose, PriorFit,
     PureRotation, RelativePoseEstimate, RelativePoseVerdict, Unobservable,
 };
 use epipole::geometry::Pose;
@@ -93,6 +93,7 @@ pub fn relative_pose_reply(
 ) -> Result<usize, Full> {
     encode(out, kind::RELATIVE_POSE | kind::ANSWER, sequence, |body| {
         write_head(body, order, elapsed_us, estimate.noise_px, &estimate.report);
+        write_fit(body, &estimate.prior);
         match &estimate.verdict {
             RelativePoseVerdict::General(motion) => {
                 body.u8(0);
@@ -138,14 +139,7 @@ pub fn absolute_pose_reply(
 ) -> Result<usize, Full> {
     encode(out, kind::ABSOLUTE_POSE | kind::ANSWER, sequence, |body| {
         write_head(body, order, elapsed_us, estimate.noise_px, &estimate.report);
-        let (fit, angle) = match estimate.gravity {
-            None => (0, 0.0),
-            Some(GravityFit::Fits(angle)) => (1, angle),
-            Some(GravityFit::Contradicted(angle)) => (2, angle),
-            Some(_) => (3, 0.0),
-        };
-        body.u8(fit);
-        body.f32(angle);
+        write_fit(body, &estimate.gravity);
         match &estimate.verdict {
             AbsolutePoseVerdict::Pose(found) => {
                 body.u8(0);
@@ -188,6 +182,7 @@ impl<'a> Reply<'a> {
 
 fn relative<'a>(body: &mut Reader<'a>) -> Option<Answer<'a, RelativePoseEstimate<f32>>> {
     let (order, elapsed_us, noise_px, report) = read_head(body)?;
+    let prior = read_fit(body)?;
     let verdict = match body.u8()? {
         0 => {
             let pose = read_pose(body)?;
@@ -216,19 +211,13 @@ fn relative<'a>(body: &mut Reader<'a>) -> Option<Answer<'a, RelativePoseEstimate
         7 => RelativePoseVerdict::NoConsensus,
         _ => return None,
     };
-    let estimate = RelativePoseEstimate { verdict, noise_px, report };
+    let estimate = RelativePoseEstimate { verdict, prior, noise_px, report };
     Some(Answer { order, elapsed_us, estimate, inliers: read_mask(body)? })
 }
 
 fn absolute<'a>(body: &mut Reader<'a>) -> Option<Answer<'a, AbsolutePoseEstimate<f32>>> {
     let (order, elapsed_us, noise_px, report) = read_head(body)?;
-    let (fit, angle) = (body.u8()?, body.f32()?);
-    let gravity = match fit {
-        0 => None,
-        1 => Some(GravityFit::Fits(angle)),
-        2 => Some(GravityFit::Contradicted(angle)),
-        _ => return None,
-    };
+    let gravity = read_fit(body)?;
     let verdict = match body.u8()? {
         0 => AbsolutePoseVerdict::Pose(read_absolute(body)?),
         1 => {
@@ -292,6 +281,28 @@ fn read_head(body: &mut Reader<'_>) -> Option<(Order, u32, f32, RansacReport<f32
     let [cost, miss_probability, excluded_inlier_ratio, noise_px] = body.f32s()?;
     let report = RansacReport { spent, stop, inliers, cost, miss_probability, excluded_inlier_ratio };
     Some((order, elapsed_us, noise_px, report))
+}
+
+fn write_fit(body: &mut Body<'_>, fit: &Option<PriorFit<f32>>) {
+    let (code, sigmas) = match *fit {
+        None => (0, 0.0),
+        Some(PriorFit::Fits(sigmas)) => (1, sigmas),
+        Some(PriorFit::Contradicted(sigmas)) => (2, sigmas),
+        Some(_) => (3, 0.0),
+    };
+    body.u8(code);
+    body.f32(sigmas);
+}
+
+#[allow(clippy::option_option)] // The outer one: the body is too short.
+fn read_fit(body: &mut Reader<'_>) -> Option<Option<PriorFit<f32>>> {
+    let (code, sigmas) = (body.u8()?, body.f32()?);
+    match code {
+        0 => Some(None),
+        1 => Some(Some(PriorFit::Fits(sigmas))),
+        2 => Some(Some(PriorFit::Contradicted(sigmas))),
+        _ => None,
+    }
 }
 
 fn write_absolute(body: &mut Body<'_>, found: &AbsolutePose<f32>) {

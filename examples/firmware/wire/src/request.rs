@@ -1,8 +1,8 @@
 //! What a server is asked.
 
-use epipole::estimate::{AbsolutePoseOptions, GravityPrior, RelativePoseOptions};
+use epipole::estimate::{AbsolutePoseOptions, GravityPrior, RelativePoseOptions, RelativePosePrior};
 use epipole::geometry::{BrownConrady, Camera, CameraError, KannalaBrandt, Pinhole};
-use epipole::nalgebra::{Vector2, Vector3};
+use epipole::nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector2, Vector3};
 use epipole::robust::RansacOptions;
 
 use crate::bytes::{Body, Reader};
@@ -93,14 +93,16 @@ impl<'a, const W: usize> Records<'a, W> {
 const SCORED: u8 = 1;
 /// A bit of the flags: a gravity prior follows the options.
 const GRAVITY: u8 = 2;
+/// A bit of the flags: a prior of the rotation follows the options.
+const ROTATION: u8 = 4;
 
 /// The most bytes before the stuffing that a request of so many correspondences takes.
 #[must_use]
 pub const fn request_bytes(correspondences: usize) -> usize {
     const CAMERA: usize = 1 + 9 * 4;
     const OPTIONS: usize = 1 + 2 * 4 + 32 + 4;
-    const MOST: usize = if 2 * CAMERA > CAMERA + 28 { 2 * CAMERA } else { CAMERA + 28 };
-    OVERHEAD + MOST + OPTIONS + 2 + correspondences * 24
+    const PRIOR: usize = (4 + 9) * 4;
+    OVERHEAD + 2 * CAMERA + OPTIONS + PRIOR + 2 + correspondences * 24
 }
 
 impl<'a> Request<'a> {
@@ -125,11 +127,25 @@ impl<'a> Request<'a> {
 /// None where the lengths are wrong; an error where a camera is.
 fn relative<'a>(body: &mut Reader<'a>) -> Option<Result<RelativePoseRequest<'a>, Reason>> {
     let cameras = [read_camera(body)?, read_camera(body)?];
-    let flags = body.u8().filter(|flags| flags & !SCORED == 0)?;
+    let flags = body.u8().filter(|flags| flags & !(SCORED | GRAVITY | ROTATION) == 0)?;
     let mut options = RelativePoseOptions::default();
     (options.max_error_px, options.sigma_px) = read_noise(body)?;
     options.ransac = read_ransac(body)?;
     let deadline_us = body.u32()?;
+    options.prior = match flags & (GRAVITY | ROTATION) {
+        0 => None,
+        GRAVITY => {
+            let (view1, view2) = (Vector3::from(body.f32s::<3>()?), Vector3::from(body.f32s::<3>()?));
+            Some(RelativePosePrior::Gravity { view1, view2, sigma_rad: body.f32()? })
+        }
+        ROTATION => {
+            let [i, j, k, w] = body.f32s()?;
+            let rotation = UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k));
+            let covariance = Matrix3::from_column_slice(&body.f32s::<9>()?);
+            Some(RelativePosePrior::Rotation { rotation, covariance })
+        }
+        _ => return None,
+    };
     let correspondences = Records::parse(body, flags & SCORED != 0)?;
     Some(match cameras {
         [Ok(a), Ok(b)] => Ok(RelativePoseRequest { cameras: [a, b], options, deadline_us, correspondences }),
@@ -210,8 +226,23 @@ pub fn relative_pose_request(
         for camera in cameras {
             write_camera(body, camera);
         }
-        body.u8(if scores.is_some() { SCORED } else { 0 });
+        let prior = match &options.prior {
+            Some(RelativePosePrior::Gravity { .. }) => GRAVITY,
+            Some(RelativePosePrior::Rotation { .. }) => ROTATION,
+            _ => 0,
+        };
+        body.u8(prior | if scores.is_some() { SCORED } else { 0 });
         write_options(body, options.max_error_px, options.sigma_px, &options.ransac, deadline_us);
+        match &options.prior {
+            Some(RelativePosePrior::Gravity { view1, view2, sigma_rad }) => {
+                body.f32s(view1.iter().chain(view2.iter()));
+                body.f32(*sigma_rad);
+            }
+            Some(RelativePosePrior::Rotation { rotation, covariance }) => {
+                body.f32s(rotation.coords.iter().chain(covariance.iter()));
+            }
+            _ => (),
+        }
         body.u16(count);
         for (k, (a, b)) in x1.iter().zip(x2).enumerate() {
             body.f32s(a.iter().chain(b.iter()));

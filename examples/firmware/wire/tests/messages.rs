@@ -2,10 +2,10 @@
 
 use epipole::estimate::{
     AbsolutePoseOptions, AbsolutePoseStorage, AbsolutePoseVerdict, GravityPrior, RelativePoseOptions,
-    RelativePoseStorage, RelativePoseVerdict, absolute_pose, relative_pose,
+    RelativePosePrior, RelativePoseStorage, RelativePoseVerdict, absolute_pose, relative_pose,
 };
 use epipole::geometry::{BrownConrady, Camera, KannalaBrandt, Pinhole};
-use epipole::nalgebra::{Vector2, Vector3};
+use epipole::nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
 use epipole_problems::{Geometry, TwoView};
 use epipole_wire::*;
 use proptest::prelude::*;
@@ -51,9 +51,21 @@ proptest! {
         numbers in prop::array::uniform2(1e-6f32..1e6),
         counts: [u32; 3],
         seed: u64,
+        prior in prop::option::of((any::<bool>(), prop::array::uniform7(-1e3f32..1e3))),
         sequence: u16,
     ) {
         let mut options = RelativePoseOptions::default();
+        options.prior = prior.map(|(gravity, g)| match gravity {
+            true => RelativePosePrior::Gravity {
+                view1: Vector3::new(g[0], g[1], g[2]),
+                view2: Vector3::new(g[3], g[4], g[5]),
+                sigma_rad: g[6],
+            },
+            false => RelativePosePrior::Rotation {
+                rotation: UnitQuaternion::new(Vector3::new(g[0], g[1], g[2])),
+                covariance: Matrix3::new(g[0], g[1], g[2], g[3], g[4], g[5], g[6], 1.0, 2.0),
+            },
+        });
         options.max_error_px = numbers[0];
         options.sigma_px = scored.then_some(numbers[1]);
         options.ransac.seed = seed;
@@ -239,7 +251,7 @@ fn refusals_come_back() {
         Reason::Options(OptionsError::Sigma),
         Reason::Options(OptionsError::Confidence),
         Reason::Options(OptionsError::NoIterations),
-        Reason::Gravity,
+        Reason::Prior,
     ] {
         for sequence in [None, Some(0), Some(65535)] {
             let refusal = Refusal { sequence, reason };
