@@ -236,7 +236,7 @@ impl<T: Real> Window<'_, T> {
             unused_points: built.unused_points,
             evaluations: observed,
         };
-        let least_damping = T::EPSILON;
+        let least_damping = T::TWO * T::EPSILON;
         // Without noise every iteration halves what is left: no share of it would end the descent.
         let negligible = from_u32::<T>(observed) * lit(NEGLIGIBLE);
         let mut growth = T::TWO;
