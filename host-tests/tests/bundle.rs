@@ -12,8 +12,8 @@ use epipole::robust::loss::Loss;
 use epipole_host_tests::Rng;
 use epipole_host_tests::bundle::HeapWindow;
 use epipole_host_tests::bundle::flight::{Flight, centre};
-use epipole_host_tests::bundle::odometer::{Odometer, Oldest};
-use epipole_host_tests::bundle::problem::{Problem, cast_pose, read_back};
+use epipole_host_tests::bundle::odometer::{Leaving, Odometer};
+use epipole_host_tests::bundle::problem::{Problem, cast_pose, pinhole, read_back};
 
 /// Five frames in a row, 40 points, noise, a share of gross errors, a start that is off.
 fn problem(seed: u64, sigma_px: f64, gross: f64) -> Problem {
@@ -23,7 +23,7 @@ fn problem(seed: u64, sigma_px: f64, gross: f64) -> Problem {
         let rotation: UnitQuaternion<f64> = rng.rotation(0.1);
         let c = Vector3::new(0.5 * k as f64, 0.1 * rng.normal(), 0.1 * rng.normal());
         p.true_poses.push(Pose::from_parts((-(rotation * c)).into(), rotation));
-        p.cameras.push([500.0, 500.0, 320.0, 240.0]);
+        p.cameras.push(pinhole([500.0, 500.0, 320.0, 240.0]).unwrap());
     }
     while p.true_points.len() < 40 {
         let x = Vector3::new(rng.range(-2.0, 4.0), rng.range(-2.0, 2.0), rng.range(4.0, 9.0));
@@ -364,18 +364,25 @@ fn handles_and_capacities() {
     assert_eq!(storage.window().position(p[1]), Err(WindowError::StalePoint));
 }
 
-/// Everything that may not change where a window is refused.
-fn state(window: &Window<'_, f64>) -> (Vec<Pose<f64>>, Vec<Vector3<f64>>, usize) {
-    (
-        window.frame_handles().map(|f| window.pose(f).unwrap()).collect(),
-        window.point_handles().map(|p| window.position(p).unwrap()).collect(),
-        window.observation_count(),
-    )
+/// The bits of everything that may not change where a window is refused.
+fn state(window: &Window<'_, f64>) -> Vec<u64> {
+    let poses = window.frame_handles().flat_map(|f| {
+        let pose = window.pose(f).unwrap();
+        pose.rotation.coords.iter().chain(&pose.translation.vector).map(|x| x.to_bits()).collect::<Vec<_>>()
+    });
+    let points = window.point_handles().flat_map(|p| {
+        let x = window.position(p).unwrap();
+        let seen = window
+            .observations_of(p)
+            .unwrap()
+            .flat_map(|(f, pixel)| [f.index() as u64, pixel.x.to_bits(), pixel.y.to_bits()]);
+        x.iter().map(|x| x.to_bits()).chain(seen).collect::<Vec<_>>()
+    });
+    poses.chain(points).collect()
 }
 
 #[test]
 fn degenerate_windows() {
-    let camera: Camera<f64> = Pinhole::new(500.0, 500.0, 320.0, 240.0).unwrap().into();
     let options = BundleOptions::<f64>::default();
     type Change = fn(&mut Window<'_, f64>, &[FrameHandle], &[PointHandle]);
     let table: [(&str, Change, BundleError); 7] = [
@@ -442,7 +449,6 @@ fn degenerate_windows() {
             BundleError::ContradictoryFixedFrames { frame: 1 },
         ),
     ];
-    let _ = camera;
     for (name, change, error) in table {
         let (mut memory, frames, points) = filled::<f64>(&problem(5, 1.0, 0.0));
         let mut window = memory.window();
@@ -451,6 +457,20 @@ fn degenerate_windows() {
         assert_eq!(window.optimise(&options).unwrap_err(), error, "{name}");
         assert_eq!(state(&window), before, "{name}: the window changed");
     }
+    // What is not a measurement is not taken in.
+    let (mut memory, frames, points) = filled::<f64>(&problem(5, 1.0, 0.0));
+    let mut window = memory.window();
+    window.remove_observation(frames[3], points[0]).unwrap();
+    let before = state(&window);
+    for (pixel, sigma, error) in [
+        (Vector2::new(f64::NAN, 1.0), 1.0, WindowError::NotFinite),
+        (Vector2::new(1.0, f64::INFINITY), 1.0, WindowError::NotFinite),
+        (Vector2::new(1.0, 1.0), f64::NAN, WindowError::NotFinite),
+        (Vector2::new(1.0, 1.0), -1.0, WindowError::NotPositive),
+    ] {
+        assert_eq!(window.add_observation(frames[3], points[0], &pixel, sigma), Err(error));
+    }
+    assert_eq!(state(&window), before);
     // One point seen once does no harm and stays where it is.
     let (mut memory, frames, points) = filled::<f64>(&problem(5, 1.0, 0.0));
     let mut window = memory.window();
@@ -533,7 +553,7 @@ fn covariances_are_those_of_the_spread() {
 
 fn a_long_flight_stays_consistent<T: Real>() {
     let flight = Flight::new(300, 40, 1.0, 11);
-    let mut odometer = Odometer::<T>::new(8, 160, Oldest::Marginalise);
+    let mut odometer = Odometer::<T>::new(8, 160, Leaving::Oldest);
     odometer.distance_sigma = Some(0.02);
     let mut rng = Rng::new(5);
     let (mut sum, mut count) = (0.0, 0);
@@ -566,8 +586,8 @@ fn the_prior_keeps_nearly_what_full_adjustment_knows() {
     let (mut prior, mut full) = (0.0, 0.0);
     for seed in 0..4 {
         let flight = Flight::new(40, 40, 1.0, 100 + seed);
-        let mut sliding = Odometer::<f64>::new(8, 160, Oldest::Marginalise);
-        let mut all = Odometer::<f64>::new(40, flight.landmarks.len(), Oldest::Keep);
+        let mut sliding = Odometer::<f64>::new(8, 160, Leaving::Oldest);
+        let mut all = Odometer::<f64>::new(40, flight.landmarks.len(), Leaving::Keep);
         for k in 0..40 {
             sliding.step(&flight, None);
             all.step(&flight, None);

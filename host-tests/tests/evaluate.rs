@@ -272,3 +272,52 @@ fn absolute_pose_of_known_points() {
     assert_eq!(run.status.code(), Some(3));
     assert!(text(&run.stderr).contains("80 correspondences, 81 announced"), "{}", text(&run.stderr));
 }
+
+#[test]
+fn bundle_problems() {
+    use epipole_host_tests::bundle::flight::{CAMERA, Flight};
+    use epipole_host_tests::bundle::problem::{Problem, pinhole};
+    let folder = folder("bundle");
+    for seed in [1, 2] {
+        let flight = Flight::new(6, 40, 0.5, seed);
+        let mut state = seed;
+        let mut off = || 0.05 * Vector3::new(random(&mut state), random(&mut state), random(&mut state));
+        let mut problem = Problem {
+            cameras: vec![pinhole(CAMERA).unwrap(); 6],
+            poses: flight.poses.clone(),
+            true_poses: flight.poses.clone(),
+            points: flight.landmarks.iter().map(|x| x + off()).collect(),
+            ..Problem::default()
+        };
+        for pose in &mut problem.poses[2..] {
+            pose.translation.vector += off();
+        }
+        for (frame, seen) in flight.seen.iter().enumerate() {
+            problem.observations.extend(seen.iter().map(|(track, pixel)| (frame, *track, *pixel)));
+        }
+        fs::write(folder.join(format!("{seed}.txt")), problem.export()).unwrap();
+    }
+    for scalar in ["f32", "f64"] {
+        let out = evaluate(
+            &folder,
+            &["bundle", "1.txt", "2.txt", "--scalar", scalar, "--csv", "b.csv", "--plot", "b.svg"],
+        );
+        assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
+        assert_eq!(text(&out.stdout).lines().count(), 3);
+        let csv = fs::read_to_string(folder.join("b.csv")).unwrap();
+        let mut rows = csv.lines().map(|l| l.split(',').collect::<Vec<_>>());
+        let header = rows.next().unwrap();
+        for row in rows {
+            let value =
+                |key: &str| -> f64 { row[header.iter().position(|h| *h == key).unwrap()].parse().unwrap() };
+            assert!(value("cost_after") < 0.2 * value("cost_before"), "{csv}");
+            assert!(value("rms_px_after") < 2.0 && value("r_deg_after") < 0.5, "{csv}");
+            assert_eq!((row[0].len(), *row.last().unwrap()), (1, "Converged"));
+        }
+        assert!(fs::read_to_string(folder.join("b.svg")).unwrap().contains("Cost of bundle adjustment"));
+    }
+    fs::write(folder.join("broken.txt"), "2 1 1 1\n1 0 0 0 1 0 0 0 nan 0 0 0\n").unwrap();
+    let out = evaluate(&folder, &["bundle", "1.txt", "broken.txt"]);
+    assert!(out.status.code() == Some(3) && text(&out.stderr).contains("skipped broken.txt"));
+    assert_eq!(evaluate(&folder, &["bundle", "broken.txt"]).status.code(), Some(1));
+}

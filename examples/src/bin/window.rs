@@ -10,15 +10,16 @@ use epipole::bundle::BundleOptions;
 use epipole::real::lit;
 use epipole::robust::loss::Loss;
 use epipole_examples::exit_code;
+use epipole_examples::window::draw_paths;
 use epipole_examples::window::flight::fly;
-use epipole_examples::window::problem::Problem;
-use epipole_examples::window::{HeapWindow, cast_pose, centre, draw_paths};
+use epipole_host_tests::bundle::HeapWindow;
+use epipole_host_tests::bundle::problem::{Problem, centre, read_back};
 
 #[derive(Parser)]
 #[command(name = "window", version, about = "Bundle adjustment of a sliding window")]
 struct Arguments {
     /// A problem to adjust instead of the flight: tracks (`ncam npt nobs`, `fx fy cx cy R_gt t_gt R t` a camera, points,
-    /// `camera point u v flag`) or the format of "Bundle Adjustment in the Large".
+    /// `camera point u v flag`), a synthetic window (`P L M huber`, ..) or the format of "Bundle Adjustment in the Large".
     file: Option<PathBuf>,
     /// Frames of the window.
     #[arg(long, value_name = "N", default_value_t = 8)]
@@ -113,19 +114,7 @@ fn adjust<T: Real>(whole: &Problem, arguments: &Arguments) -> Result<(), Box<dyn
     let mut memory = HeapWindow::<T>::new(p.poses.len(), p.points.len(), p.observations.len());
     println!("memory of the window: {} bytes", memory.bytes());
     let mut window = memory.window();
-    let mut frames = vec![];
-    for (i, (pose, camera)) in p.poses.iter().zip(&p.cameras).enumerate() {
-        let frame = window.add_frame(cast_camera(camera)?, &cast_pose(pose))?;
-        window.fix_frame(frame, i < 2)?;
-        frames.push(frame);
-    }
-    let mut points = vec![];
-    for x in &p.points {
-        points.push(window.add_point(&x.map(lit))?);
-    }
-    for (i, j, pixel) in &p.observations {
-        window.add_observation(frames[*i], points[*j], &pixel.map(lit), T::ONE)?;
-    }
+    let (frames, points) = p.fill(&mut window)?;
     let options =
         BundleOptions { loss: Loss::Huber(lit(2.0)), max_iterations: 50, ..BundleOptions::default() };
     println!("iteration         cost   damping");
@@ -149,16 +138,13 @@ fn adjust<T: Real>(whole: &Problem, arguments: &Arguments) -> Result<(), Box<dyn
         options.outlier_sigma.to_f64(),
         report.behind
     );
-    let mut after = vec![];
-    for frame in &frames {
-        after.push(cast_pose::<T, f64>(&window.pose(*frame)?));
-    }
+    let (after, _) = read_back(&window, &frames, &points);
     for (name, poses) in [("before", &p.poses), ("after", &after)] {
-        let worst = poses.iter().zip(&p.truth).fold([0.0f64; 2], |[turn, shift], (a, b)| {
+        let worst = poses.iter().zip(&p.true_poses).fold([0.0f64; 2], |[turn, shift], (a, b)| {
             let angle = (a.rotation * b.rotation.inverse()).angle().to_degrees();
             [turn.max(angle), shift.max((centre(a) - centre(b)).norm())]
         });
-        if !p.truth.is_empty() {
+        if !p.true_poses.is_empty() {
             println!(
                 "{name:6}: largest rotation error {:.4} deg, largest centre error {:.5}",
                 worst[0], worst[1]
@@ -167,24 +153,10 @@ fn adjust<T: Real>(whole: &Problem, arguments: &Arguments) -> Result<(), Box<dyn
     }
     let path = |poses: &[epipole::geometry::Pose<f64>]| poses.iter().map(centre).collect::<Vec<_>>();
     let mut paths = vec![("before", path(&p.poses)), ("after", path(&after))];
-    if !p.truth.is_empty() {
-        paths.push(("truth", path(&p.truth)));
+    if !p.true_poses.is_empty() {
+        paths.push(("truth", path(&p.true_poses)));
     }
     draw_paths(&arguments.out, "Camera centres", &paths)?;
     println!("path drawn to {}", arguments.out.display());
     Ok(())
-}
-
-fn cast_camera<T: Real>(
-    camera: &epipole::geometry::Camera<f64>,
-) -> Result<epipole::geometry::Camera<T>, Box<dyn Error>> {
-    use epipole::geometry::{BrownConrady, Camera, KannalaBrandt, Pinhole};
-    let p = camera.pinhole();
-    let pinhole = Pinhole::new(lit(p.fx()), lit(p.fy()), lit(p.cx()), lit(p.cy()))?;
-    Ok(match camera {
-        Camera::Pinhole(_) => pinhole.into(),
-        Camera::BrownConrady(c) => BrownConrady::new(pinhole, c.distortion().map(lit))?.into(),
-        Camera::KannalaBrandt(c) => KannalaBrandt::new(pinhole, c.coefficients().map(lit))?.into(),
-        _ => return Err("a camera model that this program does not know".into()),
-    })
 }

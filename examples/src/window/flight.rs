@@ -9,7 +9,9 @@ use epipole::geometry::{Camera, CameraModel, Pinhole, Pose};
 use epipole::nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector2, Vector3};
 use epipole::real::lit;
 
-use super::{HeapWindow, cast_pose, centre, nearest_to_rays};
+use epipole_host_tests::bundle::HeapWindow;
+use epipole_host_tests::bundle::problem::{cast_pose, centre, nearest_to_rays};
+
 use crate::noise::Rng;
 
 /// What the window did with one frame.

@@ -1,87 +1,12 @@
-//! Windows of bundle adjustment on the heap, the problems that go into them, and their picture.
+//! A flight followed by a sliding window, and its picture.
 
 pub mod flight;
-pub mod problem;
 
 use std::error::Error;
 use std::path::Path;
 
-use epipole::Real;
-use epipole::bundle::{
-    FrameSlot, ObservationSlot, PointSlot, Window, WindowHeader, WindowMemory, scalars_len,
-};
-use epipole::geometry::Pose;
-use epipole::nalgebra::{UnitQuaternion, Vector3};
-use epipole::real::lit;
+use epipole::nalgebra::Vector3;
 use plotters::prelude::*;
-
-/// A window's memory on the heap, its capacities chosen at run time.
-pub struct HeapWindow<T: Real> {
-    header: WindowHeader,
-    frames: Vec<FrameSlot<T>>,
-    points: Vec<PointSlot<T>>,
-    observations: Vec<ObservationSlot<T>>,
-    scalars: Vec<T>,
-}
-
-impl<T: Real> HeapWindow<T> {
-    /// Memory of these capacities.
-    pub fn new(frames: usize, points: usize, observations: usize) -> Self {
-        Self {
-            header: WindowHeader::EMPTY,
-            frames: vec![FrameSlot::EMPTY; frames],
-            points: vec![PointSlot::EMPTY; points],
-            observations: vec![ObservationSlot::EMPTY; observations],
-            scalars: vec![T::ZERO; scalars_len(frames)],
-        }
-    }
-
-    /// Its size in bytes.
-    pub fn bytes(&self) -> usize {
-        size_of_val(&self.header)
-            + size_of_val(&*self.frames)
-            + size_of_val(&*self.points)
-            + size_of_val(&*self.observations)
-            + size_of_val(&*self.scalars)
-    }
-
-    /// The window over it, as it was left.
-    pub fn window(&mut self) -> Window<'_, T> {
-        Window::new(WindowMemory {
-            header: &mut self.header,
-            frames: &mut self.frames,
-            points: &mut self.points,
-            observations: &mut self.observations,
-            scalars: &mut self.scalars,
-        })
-        .expect("the slices have the lengths asked for")
-    }
-}
-
-/// The camera's centre in the world.
-pub fn centre(pose: &Pose<f64>) -> Vector3<f64> {
-    -(pose.rotation.inverse() * pose.translation.vector)
-}
-
-/// A pose of another scalar.
-pub fn cast_pose<A: Real, B: Real>(pose: &Pose<A>) -> Pose<B> {
-    let c = |x: A| lit::<B>(x.to_f64());
-    let rotation = UnitQuaternion::new_unchecked(pose.rotation.coords.map(c).into());
-    Pose::from_parts(pose.translation.vector.map(c).into(), rotation)
-}
-
-/// The point nearest to rays `(origin, unit direction)`; none where they are parallel.
-pub fn nearest_to_rays(rays: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Vector3<f64>> {
-    let mut a = epipole::nalgebra::Matrix3::zeros();
-    let mut b = Vector3::zeros();
-    for (origin, d) in rays {
-        let across = epipole::nalgebra::Matrix3::identity() - d * d.transpose();
-        a += across;
-        b += across * origin;
-    }
-    let x = a.try_inverse()? * b;
-    x.iter().all(|x| x.is_finite()).then_some(x)
-}
 
 /// A path with its name.
 pub type NamedPath<'a> = (&'a str, Vec<Vector3<f64>>);

@@ -8,7 +8,7 @@ use epipole::robust::loss::Loss;
 use epipole_host_tests::Rng;
 use epipole_host_tests::bundle::HeapWindow;
 use epipole_host_tests::bundle::flight::{CAMERA, Flight};
-use epipole_host_tests::bundle::problem::{Problem, cast_pose};
+use epipole_host_tests::bundle::problem::{Problem, cast_pose, pinhole};
 
 use crate::Run;
 
@@ -29,7 +29,7 @@ fn problem() -> Problem {
         seen.iter().filter_map(move |(track, pixel)| Some((frame, kept.binary_search(track).ok()?, *pixel)))
     });
     Problem {
-        cameras: vec![CAMERA; FRAMES],
+        cameras: vec![pinhole(CAMERA).expect("a camera"); FRAMES],
         observations: observations.collect::<Vec<(usize, usize, Vector2<f64>)>>(),
         poses: flight.poses.clone(),
         points: kept.iter().map(|track| flight.landmarks[*track] + 0.05 * rng.normal3()).collect(),

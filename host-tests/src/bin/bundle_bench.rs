@@ -50,7 +50,7 @@ fn options<T: Real>(max_iterations: u32) -> BundleOptions<T> {
     BundleOptions { loss: Loss::Huber(T::ONE), max_iterations, ..BundleOptions::default() }
 }
 
-fn main() -> std::io::Result<()> {
+fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().collect();
     let [_, repeats, out, files @ ..] = arguments.as_slice() else {
         eprintln!("bundle_bench REPEATS OUT.csv problem.txt ...");
@@ -64,7 +64,7 @@ fn main() -> std::io::Result<()> {
          cost_final,cost_truth,max_rot_err_deg"
     )?;
     for file in files {
-        let problem = Problem::read_harness(Path::new(file))?;
+        let problem = Problem::read(Path::new(file))?;
         let loss = Loss::Huber(1.0);
         let start = problem.cost(&problem.poses, &problem.points, &loss);
         let truth = problem.cost(&problem.true_poses, &problem.true_points, &loss);

@@ -5,6 +5,7 @@ use epipole::nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion, Vector
 
 use epipole::real::sin_cos;
 
+pub use super::problem::centre;
 use crate::Rng;
 
 /// Metres between frames.
@@ -76,11 +77,6 @@ impl Flight {
     pub fn centre(&self, k: usize) -> Vector3<f64> {
         centre(&self.poses[k])
     }
-}
-
-/// The camera's centre.
-pub fn centre(pose: &Pose<f64>) -> Vector3<f64> {
-    -(pose.rotation.inverse() * pose.translation.vector)
 }
 
 fn project(pose: &Pose<f64>, x: &Vector3<f64>) -> Option<Vector2<f64>> {

@@ -3,6 +3,7 @@
 pub mod flight;
 pub mod odometer;
 pub mod problem;
+mod problem_file;
 
 use epipole::Real;
 use epipole::bundle::{
@@ -28,6 +29,15 @@ impl<T: Real> HeapWindow<T> {
             observations: vec![ObservationSlot::EMPTY; observations],
             scalars: vec![T::ZERO; scalars_len(frames)],
         }
+    }
+
+    /// Its size in bytes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.header)
+            + size_of_val(&*self.frames)
+            + size_of_val(&*self.points)
+            + size_of_val(&*self.observations)
+            + size_of_val(&*self.scalars)
     }
 
     /// The window over it, as it was left.

@@ -13,14 +13,16 @@ use super::HeapWindow;
 use super::flight::{CAMERA, Flight, centre};
 use super::problem::cast_pose;
 
-/// What happens to the oldest frame.
+/// What makes room for a new frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Oldest {
-    /// It is marginalised.
-    Marginalise,
-    /// It is removed, and the next oldest two are fixed where they are.
+pub enum Leaving {
+    /// The oldest frame is marginalised.
+    Oldest,
+    /// The oldest frame and one from the middle are marginalised by turns, so that the window reaches twice as far back.
+    Alternate,
+    /// The oldest frame is removed, and the next oldest two are fixed where they are.
     Forget,
-    /// It stays: full bundle adjustment.
+    /// None leaves: full bundle adjustment.
     Keep,
 }
 
@@ -28,29 +30,32 @@ pub enum Oldest {
 pub struct Odometer<T: Real> {
     memory: HeapWindow<T>,
     capacity: usize,
-    oldest: Oldest,
+    leaving: Leaving,
     options: BundleOptions<T>,
     frames: VecDeque<(usize, FrameHandle)>,
     points: HashMap<usize, PointHandle>,
     waiting: HashMap<usize, Vec<(usize, Vector2<f64>)>>,
     /// Estimated poses so far, as they were when the frame was new.
     pub poses: Vec<Pose<f64>>,
+    /// All is optimised with every so many frames, a new frame and its points alone in between.
+    pub optimise_every: usize,
     /// Standard deviation of the distance between neighbouring frames, if it is measured.
     pub distance_sigma: Option<f64>,
 }
 
 impl<T: Real> Odometer<T> {
     /// A window of so many frames.
-    pub fn new(capacity: usize, points: usize, oldest: Oldest) -> Self {
+    pub fn new(capacity: usize, points: usize, leaving: Leaving) -> Self {
         Self {
             memory: HeapWindow::new(capacity, points, points * capacity.min(24)),
             capacity,
-            oldest,
+            leaving,
             options: BundleOptions { loss: Loss::Huber(lit(2.0)), ..BundleOptions::default() },
             frames: VecDeque::new(),
             points: HashMap::new(),
             waiting: HashMap::new(),
             poses: vec![],
+            optimise_every: 1,
             distance_sigma: None,
         }
     }
@@ -87,8 +92,10 @@ impl<T: Real> Odometer<T> {
         let k = self.poses.len();
         let mut window = self.memory.window();
         if self.frames.len() == self.capacity {
-            let (gone, handle) = self.frames.pop_front().expect("a full window");
-            if self.oldest == Oldest::Marginalise {
+            let middle = self.leaving == Leaving::Alternate && k % 2 == 1;
+            let leaving = if middle { self.capacity / 2 } else { 0 };
+            let (gone, handle) = self.frames.remove(leaving).expect("a full window");
+            if self.leaving != Leaving::Forget {
                 window.marginalise_frame(handle, &self.options.loss).expect("a live frame");
             } else {
                 window.remove_frame(handle).expect("a live frame");
@@ -161,11 +168,11 @@ impl<T: Real> Odometer<T> {
             self.points.insert(*track, point);
             self.waiting.remove(track);
         }
-        if k >= 2 {
+        if k >= 2 && (k + 1).is_multiple_of(self.optimise_every) {
             let _ = window.optimise(&self.options);
         }
         self.poses.push(cast_pose(&window.pose(frame).expect("live")));
-        if self.oldest != Oldest::Keep {
+        if self.leaving != Leaving::Keep {
             let now: std::collections::HashSet<usize> = flight.seen[k].iter().map(|s| s.0).collect();
             self.waiting.retain(|track, _| now.contains(track));
         }

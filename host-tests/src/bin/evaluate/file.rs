@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 use epipole::nalgebra::{Matrix3, Vector2, Vector3};
 
 /// What must be estimated; it decides which header lines a file needs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Problem {
     RelativePose,
     Homography,

@@ -1,9 +1,11 @@
-//! Judges epipole's robust estimators on correspondence files with ground truth.
+//! Judges epipole's robust estimators on correspondence files with ground truth, and its bundle adjustment on problem
+//! files.
 //!
 //! `cargo run --release --bin evaluate -- relative-pose PATH...`, where a path is a file, or a folder that is searched
 //! for `.txt` files. The format of the files is described in `file.rs` and by `--help`.
 
 mod absolute;
+mod bundle;
 mod file;
 mod plot;
 mod report;
@@ -38,6 +40,13 @@ Format of a file, one item a line; lines that start with `#` are skipped, but `#
                         left out
 For absolute-pose: K fx fy cx cy, R_gt and t_gt (x ~ K (R_gt X + t_gt)), n N, then lines X Y Z u v score.
 The correspondences are shuffled before they are used.
+For bundle, a problem with its start, one of
+  P L M huber           then P poses (R row-major, t), L points, M observations `pose point x y` on the plane z = 1,
+                        the true poses and points; the focal length is 718, the first two poses are exact
+  ncam npt nobs         then cameras `fx fy cx cy R_true t_true R t`, points, observations `camera point u v flag`
+  ncam npt nobs         then of Bundle Adjustment in the Large: observations, cameras `w t f k1 k2`, points
+All of it is adjusted with the first two frames fixed, Huber's loss at --threshold [default: 2] and at most
+--max-iterations [default: 50]; --plot draws the cost by iteration; the other options do not apply.
 
 Errors: relative-pose and fundamental (by its essential matrix), rotation and direction of translation in degrees, by
 the chord; homography, the mean distance in pixels over the part of image 1 that the truth sends into image 2;
@@ -47,10 +56,10 @@ fails above 5 degrees or 10 pixels; a refusal is a failure.
 Exit code: 0; 1 if nothing could be evaluated; 2 for a wrong command line; 3 if some file was broken and skipped.";
 
 #[derive(Parser)]
-#[command(name = "evaluate", version, about = "Judge the robust estimators on files with ground truth", after_help = FORMAT)]
+#[command(name = "evaluate", version, about = "Judge the robust estimators and bundle adjustment on files", after_help = FORMAT)]
 struct Arguments {
     /// What to estimate.
-    problem: Problem,
+    task: Task,
     /// Files, or folders searched for .txt files.
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
@@ -75,7 +84,7 @@ struct Arguments {
     /// Write one line a file.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Draw the cumulative error curves (SVG).
+    /// Draw the cumulative error curves, or the falling costs of bundle adjustment (SVG).
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     /// Draw the share of failures among the answers that the estimate trusts most (SVG).
@@ -87,6 +96,29 @@ struct Arguments {
     /// Milliseconds after which no sample is drawn any more.
     #[arg(long, value_name = "MS", value_parser = milliseconds)]
     time_budget: Option<Duration>,
+}
+
+/// What can be judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Task {
+    RelativePose,
+    Homography,
+    Fundamental,
+    AbsolutePose,
+    Bundle,
+}
+
+impl Task {
+    /// The estimation; none for bundle adjustment.
+    fn problem(self) -> Option<Problem> {
+        match self {
+            Self::RelativePose => Some(Problem::RelativePose),
+            Self::Homography => Some(Problem::Homography),
+            Self::Fundamental => Some(Problem::Fundamental),
+            Self::AbsolutePose => Some(Problem::AbsolutePose),
+            Self::Bundle => None,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -138,7 +170,6 @@ fn main() -> ExitCode {
 }
 
 fn evaluate(arguments: &Arguments) -> Result<ExitCode, String> {
-    let problem = arguments.problem;
     let settings = Settings {
         threshold_px: arguments.threshold,
         confidence: arguments.confidence,
@@ -159,6 +190,9 @@ fn evaluate(arguments: &Arguments) -> Result<ExitCode, String> {
     if paths.is_empty() {
         return Err("no .txt file in the folders given".into());
     }
+    let Some(problem) = arguments.task.problem() else {
+        return bundle::evaluate(arguments, &paths);
+    };
 
     let passes = 1 + if arguments.plot_time.is_some() { BUDGETS.len() } else { 0 };
     let progress = ProgressBar::new((passes * paths.len()) as u64);

@@ -60,6 +60,23 @@ fn draw(path: &Path, axes: Axes, curves: &[Curve]) -> Result<(), Box<dyn Error>>
     Ok(())
 }
 
+/// The cost of bundle adjustment by iteration, as the logarithm of its share of the first.
+pub(crate) fn falling_cost(path: &Path, curves: Vec<Curve>) -> Result<(), Box<dyn Error>> {
+    let points = || curves.iter().flat_map(|c| &c.1);
+    let last = points().fold(1.0f64, |m, p| m.max(p.0));
+    let lowest = points().fold(-0.1f64, |m, p| m.min(p.1));
+    let axes = Axes {
+        caption: "Cost of bundle adjustment",
+        x: "iteration".into(),
+        y: "log10 of the cost's share of the first".into(),
+        x_range: 0.0..last,
+        y_range: 1.1 * lowest..0.05,
+        x_label: |x| format!("{x:.0}"),
+        legend: SeriesLabelPosition::UpperRight,
+    };
+    draw(path, axes, &curves)
+}
+
 /// The cumulative error of each scene and of all files.
 pub(crate) fn cumulative_error(
     path: &Path,
