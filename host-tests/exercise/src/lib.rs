@@ -9,6 +9,7 @@ mod bundle;
 mod estimate;
 mod geometry;
 mod linalg;
+mod refine;
 mod robust;
 mod sink;
 mod solvers;
@@ -46,6 +47,7 @@ pub const CAPABILITIES: &[Capability] = capabilities! {
         many_view_triangulation essential homography fundamental;
     solvers: relpose_5pt relpose_7pt relpose_8pt homography absolute_minimal absolute_linear partial_motions;
     robust: losses sampling_and_stopping scoring engine;
+    refine: two_views;
     bundle: window random_calls;
     estimate: two_view_relative_pose two_view_matrices absolute;
 };

@@ -1,7 +1,7 @@
 //! `epipole::robust`: the parts of RANSAC, and the engine on an estimator of the simplest kind.
 
 use epipole::Real;
-use epipole::real::{from_u32, is_finite};
+use epipole::real::{from_u32, is_finite, lit};
 use epipole::robust::loss::Loss;
 use epipole::robust::{
     Estimator, Gate, Guide, RansacOptions, Sampler, Score, ScoreCounts, Tally, iterations_needed,
@@ -90,6 +90,11 @@ impl<T: Real> Estimator<T, 2> for Location<T> {
         let [a, b] = sample.map(|index| self.0.get(index as usize).copied().unwrap_or(T::ZERO));
         found(&((a + b) * T::HALF));
         is_finite(a) && is_finite(b)
+    }
+
+    fn polish(&self, model: &T, counts: &mut ScoreCounts) -> Option<T> {
+        counts.residuals += 1;
+        self.0.first().map(|x| *model + (*x - *model) * lit::<T>(1e-3))
     }
 
     fn score(&self, model: &T, gate: &Gate<T>, counts: &mut ScoreCounts) -> Option<Score<T>> {

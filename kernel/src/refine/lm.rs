@@ -36,6 +36,21 @@ pub(crate) struct NormalEquations<T: Real, const P: usize> {
     pub(crate) active: u32,
 }
 
+impl<T: Real, const P: usize> NormalEquations<T, P> {
+    /// Of no correspondences.
+    pub(crate) fn zero() -> Self {
+        Self { hessian: SMatrix::zeros(), gradient: SVector::zeros(), cost: T::ZERO, active: 0 }
+    }
+
+    /// Adds those of other correspondences.
+    pub(crate) fn accumulate(&mut self, other: &Self) {
+        self.hessian += other.hessian;
+        self.gradient += other.gradient;
+        self.cost += other.cost;
+        self.active += other.active;
+    }
+}
+
 struct Sums<T, const P: usize> {
     hessian: [[Lanes<T>; P]; P],
     gradient: [Lanes<T>; P],
