@@ -15,16 +15,16 @@ pub trait Estimator<T: Real, const S: usize> {
     /// serve where a minimal sample already fixes the model well.
     const NEAR_MISSES: u32 = 10;
 
-    /// Residuals of one correspondence that [`polish`](Self::polish) and [`score`](Self::score) together evaluate at the
-    /// most, for one hypothesis.
-    const SCORE_PASSES: u32 = 2;
-
     /// Beyond those, one in as many iterations.
     const NEAR_MISS_INTERVAL: u32 = 32;
 
     /// How many local optimisations must have led to the best optimum for a run to end with the samples that one of
     /// inliers only takes: more than one where samples of noisy inliers lead to different optima.
     const DISCOVERIES: u32 = 1;
+
+    /// Residuals of one correspondence that [`polish`](Self::polish) and [`score`](Self::score) together evaluate at the
+    /// most, for one hypothesis.
+    const SCORE_PASSES: u32 = 2;
 
     /// How many correspondences there are.
     fn count(&self) -> u32;

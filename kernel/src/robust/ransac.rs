@@ -47,7 +47,7 @@ pub struct Consensus<M, T> {
 /// rejected, or there are fewer correspondences than a sample takes.
 ///
 /// # Cost
-/// At most the budget, of which the residuals may be exceeded by the hypotheses of one sample and one refinement.
+/// At most the budget; one local optimisation, begun within the budget of residuals, may end beyond it.
 /// Memory: the models alone, on the stack.
 ///
 /// # References
