@@ -11,6 +11,7 @@
 
 pub mod count;
 pub mod stack;
+pub mod worst_case;
 
 use defmt_semihosting as _;
 pub use semihosting::{print, println};

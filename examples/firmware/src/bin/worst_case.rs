@@ -1,0 +1,146 @@
+//! Measures the robust estimators on input that costs most, and checks the bounds of `epipole_firmware::worst_case`: no call may
+//! take more than its bound, and a budget turned into samples by the bound must be kept to within 5 %. Exit code 1
+//! where one is not.
+#![no_std]
+#![no_main]
+
+use core::hint::black_box;
+
+use epipole::estimate::{
+    AbsolutePoseOptions, AbsolutePoseStorage, FundamentalOptions, HomographyOptions, RelativePoseOptions,
+    TwoViewStorage, absolute_pose, fundamental, homography, relative_pose,
+};
+use epipole::geometry::Pinhole;
+use epipole::nalgebra::{Vector2, Vector3};
+use epipole::robust::RansacOptions;
+use epipole_firmware::worst_case::{ABSOLUTE_POSE, Bound, FUNDAMENTAL, HOMOGRAPHY, RELATIVE_POSE};
+use epipole_firmware::{count, entry, println};
+use epipole_problems::two_view::FOCAL;
+use epipole_problems::{Geometry, TwoView};
+
+const N: usize = 200;
+const SIZES: [usize; 3] = [40, 100, 200];
+const SAMPLES: [u32; 2] = [8, 64];
+/// Budgets, instructions.
+const BUDGETS: [u64; 3] = [5_000_000, 20_000_000, 60_000_000];
+
+/// Correspondences that make an estimator work: pixels of two views and the points of the first.
+struct Input {
+    name: &'static str,
+    x1: [Vector2<f32>; N],
+    x2: [Vector2<f32>; N],
+    points: [Vector3<f32>; N],
+}
+
+fn inputs(found: &mut dyn FnMut(&Input)) {
+    for (name, geometry) in [
+        ("noise and wrong matches", Geometry::Ransac),
+        ("exact", Geometry::General),
+        ("exact plane", Geometry::Planar),
+        ("all wrong", Geometry::Ransac),
+        ("turning", Geometry::General),
+        ("repeated", Geometry::General),
+    ] {
+        let scene = TwoView::<N>::new(geometry, 3);
+        let ([x1, mut x2], points) = (scene.pixels(), scene.points());
+        let mut input = Input { name, x1, x2, points };
+        match name {
+            "all wrong" => input.x2 = TwoView::<N>::new(geometry, 99).pixels()[1],
+            "turning" => {
+                let rotation = scene.pose::<f32>().rotation;
+                for (x2, point) in x2.iter_mut().zip(&points) {
+                    let ray = rotation * point;
+                    *x2 = ray.xy() * (FOCAL as f32 / ray.z);
+                }
+                input.x2 = x2;
+            }
+            "repeated" => {
+                for k in 0..N {
+                    (input.x1[k], input.x2[k]) = (input.x1[k % 12], input.x2[k % 12]);
+                    input.points[k] = input.points[k % 12];
+                }
+            }
+            _ => {}
+        }
+        found(&input);
+    }
+}
+
+/// Calls with a number of correspondences and a limit of samples; the cost.
+type Call<'a> = &'a mut dyn FnMut(&Input, usize, RansacOptions<f32>) -> u64;
+
+/// Prints the dearest input of each size, and whether bound and budgets hold.
+fn check(name: &str, bound: &Bound, call: Call<'_>) -> bool {
+    let mut kept = true;
+    let options = |samples| {
+        let mut options = RansacOptions::<f32>::default();
+        options.confidence = 0.999_999;
+        options.min_iterations = u32::MAX;
+        options.budget.max_iterations = samples;
+        options
+    };
+    for n in SIZES {
+        for samples in SAMPLES {
+            let (mut most, mut dearest) = (0, "");
+            inputs(&mut |input| {
+                let cost = call(input, n, options(samples));
+                if cost > most {
+                    (most, dearest) = (cost, input.name);
+                }
+            });
+            let limit = bound.instructions(n as u64, samples.into());
+            kept &= most <= limit;
+            println!("{name} | {n} | {samples} | {most} | {limit} | {dearest}");
+        }
+        for budget in BUDGETS {
+            let Some(samples) = bound.max_iterations(budget, n as u64) else { continue };
+            let mut most = 0;
+            inputs(&mut |input| most = most.max(call(input, n, options(samples))));
+            kept &= most <= budget + budget / 20;
+            println!("{name} | {n} | {samples} | {most} | {budget} | budget");
+        }
+    }
+    kept
+}
+
+entry!(main);
+
+fn main() -> i32 {
+    count::init();
+    println!("estimator | N | samples | instructions at the most | bound | dearest input");
+    let focal = FOCAL as f32;
+    let Ok(camera) = Pinhole::new(focal, focal, 0.0, 0.0) else { return 2 };
+    let mut storage = TwoViewStorage::<f32, N>::new();
+    let mut workspace = storage.workspace();
+    let mut kept = check("relative_pose", &RELATIVE_POSE, &mut |input, n, ransac| {
+        let mut options = RelativePoseOptions::default();
+        options.ransac = ransac;
+        let (x1, x2) = (black_box(&input.x1[..n]), &input.x2[..n]);
+        count::measure(|| relative_pose(&camera, &camera, x1, x2, &options, &mut workspace).is_ok()).1
+    });
+    kept &= check("homography", &HOMOGRAPHY, &mut |input, n, ransac| {
+        let mut options = HomographyOptions::default();
+        options.ransac = ransac;
+        let (x1, x2) = (black_box(&input.x1[..n]), &input.x2[..n]);
+        count::measure(|| homography(x1, x2, &options, &mut workspace).is_ok()).1
+    });
+    kept &= check("fundamental", &FUNDAMENTAL, &mut |input, n, ransac| {
+        let mut options = FundamentalOptions::default();
+        options.ransac = ransac;
+        let (x1, x2) = (black_box(&input.x1[..n]), &input.x2[..n]);
+        count::measure(|| fundamental(x1, x2, &options, &mut workspace).is_ok()).1
+    });
+    let mut storage = AbsolutePoseStorage::<f32, N>::new();
+    let mut workspace = storage.workspace();
+    kept &= check("absolute_pose", &ABSOLUTE_POSE, &mut |input, n, ransac| {
+        let mut options = AbsolutePoseOptions::default();
+        options.ransac = ransac;
+        let (x2, points) = (black_box(&input.x2[..n]), &input.points[..n]);
+        count::measure(|| absolute_pose(&camera, x2, points, &options, &mut workspace).is_ok()).1
+    });
+    println!(
+        "{}",
+        if kept { "every bound and every budget kept" } else { "a bound or a budget was not kept" }
+    );
+    i32::from(!kept)
+}

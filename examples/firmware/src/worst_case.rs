@@ -1,0 +1,53 @@
+//! Bounds on the instructions of the robust estimators, for budgets in time.
+//!
+//! An estimate of N correspondences that draws k samples takes at most `a + b N + k (c + d N)` instructions on this core:
+//! every sample may hand over all its hypotheses, each scored on all correspondences, and start a local optimisation.
+//! The constants are those of a Cortex-M4F in `f32` at opt-level 3, from `cargo m4f worst_case`, with a margin of a tenth;
+//! another core or compiler needs its own.
+
+/// The constants of one estimator.
+#[derive(Clone, Copy, Debug)]
+pub struct Bound {
+    /// a: whatever happens once.
+    pub fixed: u64,
+    /// b: loading, verdict and covariance, for each correspondence.
+    pub per_point: u64,
+    /// c: a sample, its solver and what its local optimisation does once.
+    pub per_sample: u64,
+    /// d: scores and local optimisation of a sample, for each correspondence.
+    pub per_sample_and_point: u64,
+}
+
+impl Bound {
+    /// Instructions at the most, of `n` correspondences and `samples` samples.
+    #[must_use]
+    pub const fn instructions(&self, n: u64, samples: u64) -> u64 {
+        self.fixed + self.per_point * n + samples * (self.per_sample + self.per_sample_and_point * n)
+    }
+
+    /// The samples for which `n` correspondences surely stay within a budget of instructions, for
+    /// `Budget::max_iterations`; none where the budget does not suffice for one.
+    #[must_use]
+    pub const fn max_iterations(&self, budget: u64, n: u64) -> Option<u32> {
+        let once = self.fixed + self.per_point * n;
+        let samples = budget.saturating_sub(once) / (self.per_sample + self.per_sample_and_point * n);
+        match samples {
+            0 => None,
+            _ if samples > u32::MAX as u64 => Some(u32::MAX),
+            _ => Some(samples as u32),
+        }
+    }
+}
+
+/// `estimate::relative_pose` of pinhole cameras.
+pub const RELATIVE_POSE: Bound =
+    Bound { fixed: 2_000_000, per_point: 8_000, per_sample: 200_000, per_sample_and_point: 9_000 };
+/// `estimate::absolute_pose` of a pinhole camera, without a gravity prior.
+pub const ABSOLUTE_POSE: Bound =
+    Bound { fixed: 200_000, per_point: 6_000, per_sample: 40_000, per_sample_and_point: 4_600 };
+/// `estimate::homography`.
+pub const HOMOGRAPHY: Bound =
+    Bound { fixed: 300_000, per_point: 10_000, per_sample: 20_000, per_sample_and_point: 500 };
+/// `estimate::fundamental`.
+pub const FUNDAMENTAL: Bound =
+    Bound { fixed: 2_000_000, per_point: 100_000, per_sample: 100_000, per_sample_and_point: 9_000 };
