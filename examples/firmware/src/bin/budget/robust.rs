@@ -4,7 +4,8 @@ use core::hint::black_box;
 
 use epipole::estimate::{
     AbsolutePoseOptions, AbsolutePoseStorage, FundamentalOptions, GravityPrior, HomographyOptions,
-    RelativePoseOptions, RelativePoseStorage, absolute_pose, fundamental, homography, relative_pose,
+    RelativePoseOptions, RelativePosePrior, RelativePoseStorage, absolute_pose, fundamental, homography,
+    relative_pose,
 };
 use epipole::geometry::{Pinhole, Pose};
 use epipole::nalgebra::{Matrix3, Vector3, Vector6};
@@ -51,13 +52,19 @@ pub fn run() {
     options.max_error_px = 2.0;
     options.ransac.confidence = 0.99;
     options.ransac.budget.max_iterations = 300;
-    rows("estimate_relative_pose", Geometry::Ransac, |scene| {
-        let [x1, x2] = scene.pixels();
-        trial(
-            || relative_pose(&camera, &camera, black_box(&x1), black_box(&x2), &options, &mut workspace),
-            |estimate| rotation_error(scene, estimate.as_ref().ok().and_then(|e| e.pose())),
-        )
-    });
+    for gravity in [false, true] {
+        let name = if gravity { "estimate_relative_pose, gravity" } else { "estimate_relative_pose" };
+        rows(name, Geometry::Ransac, |scene| {
+            let [x1, x2] = scene.pixels();
+            let (view1, view2) = (Vector3::y(), scene.pose::<f32>().rotation * Vector3::y());
+            let mut options = options;
+            options.prior = gravity.then_some(RelativePosePrior::Gravity { view1, view2, sigma_rad: 0.009 });
+            trial(
+                || relative_pose(&camera, &camera, black_box(&x1), black_box(&x2), &options, &mut workspace),
+                |estimate| rotation_error(scene, estimate.as_ref().ok().and_then(|e| e.pose())),
+            )
+        });
+    }
     let mut options = AbsolutePoseOptions::<f32>::default();
     options.max_error_px = 2.0;
     options.ransac.confidence = 0.99;
