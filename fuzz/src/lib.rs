@@ -8,6 +8,8 @@
 //! cargo fuzz run --sanitizer none solvers -- -max_total_time=600 -max_len=2048
 //! ```
 
+pub mod capi;
+
 use epipole_exercise::{CAPABILITIES, Sink, Source};
 
 /// Runs one capability of a group, chosen by the first byte, on the other bytes. Panics where a promise is broken.

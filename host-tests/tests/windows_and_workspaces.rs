@@ -82,6 +82,10 @@ fn handles_count_slots() {
     let (frames, points) = fill(&mut window);
     assert!(frames.iter().map(|frame| frame.index()).eq(0..3));
     assert!(points.iter().map(|point| point.index()).eq(0..8));
+    // As numbers and back.
+    assert!(frames.iter().all(|frame| FrameHandle::from_bits(frame.to_bits()) == *frame));
+    assert!(points.iter().all(|point| PointHandle::from_bits(point.to_bits()) == *point));
+    assert!(window.pose(FrameHandle::from_bits(frames[0].to_bits() ^ 1 << 16)).is_err());
 }
 
 in_both_scalars! {

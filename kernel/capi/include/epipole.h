@@ -193,8 +193,12 @@ enum epi_status
     EPI_STATUS_NO_USABLE_POINT = -36,
     // A free frame has no observation of a usable point, no prior and no distance.
     EPI_STATUS_UNCONSTRAINED_FRAME = -37,
+    // A prior needs finite directions or a rotation, and a positive uncertainty.
+    EPI_STATUS_PRIOR = -38,
+    // The pose to start from has a translation of zero.
+    EPI_STATUS_START = -39,
     // An error that this version of the header does not name.
-    EPI_STATUS_OTHER = -38,
+    EPI_STATUS_OTHER = -40,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -458,26 +462,26 @@ typedef uint32_t epi_absolute_pose_verdict;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// What became of a gravity prior.
-enum epi_gravity_fit
+// What became of a prior.
+enum epi_prior_fit
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     // None was given, or no pose found.
-    EPI_GRAVITY_FIT_NONE = 0,
+    EPI_PRIOR_FIT_NONE = 0,
     // It took part in the refinement.
-    EPI_GRAVITY_FIT_FITS = 1,
+    EPI_PRIOR_FIT_FITS = 1,
     // The correspondences contradict it, and it was left aside.
-    EPI_GRAVITY_FIT_CONTRADICTED = 2,
+    EPI_PRIOR_FIT_CONTRADICTED = 2,
     // Something that this version of the header does not name.
-    EPI_GRAVITY_FIT_OTHER = 3,
+    EPI_PRIOR_FIT_OTHER = 3,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
-typedef enum epi_gravity_fit epi_gravity_fit;
+typedef enum epi_prior_fit epi_prior_fit;
 #else
-typedef uint32_t epi_gravity_fit;
+typedef uint32_t epi_prior_fit;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -529,6 +533,27 @@ typedef uint32_t epi_termination;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
+// What is known of a relative pose beforehand.
+enum epi_relative_pose_prior
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // Nothing; the fields of the others are ignored.
+    EPI_RELATIVE_POSE_PRIOR_NONE = 0,
+    // The direction of gravity in both views.
+    EPI_RELATIVE_POSE_PRIOR_GRAVITY = 1,
+    // The rotation.
+    EPI_RELATIVE_POSE_PRIOR_ROTATION = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum epi_relative_pose_prior epi_relative_pose_prior;
+#else
+typedef uint32_t epi_relative_pose_prior;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
 // A window of frames, points and observations. Made by `epi_window_create`, in the caller's memory.
 typedef struct epi_window_f32 epi_window_f32;
 
@@ -571,6 +596,18 @@ typedef struct epi_relative_pose_options_f32 {
     float max_error_px;
     // Standard deviation of the noise of one image coordinate, pixels; 0 for half of `max_error_px`.
     float sigma_px;
+    // Of gravity as a prior: its direction in view 1, of any length.
+    float prior_view1[3];
+    // Its direction in view 2.
+    float prior_view2[3];
+    // Standard deviation of each of the two directions, about each axis across it, rad.
+    float prior_sigma_rad;
+    // Of the rotation as a prior: a unit quaternion `i j k w`.
+    float prior_rotation[4];
+    // Covariance of w of `R <- Exp(w) R`, rad^2: 3x3 by rows.
+    float prior_covariance[3][3];
+    // What is known: one of `epi_relative_pose_prior`.
+    uint32_t prior;
 } epi_relative_pose_options_f32;
 
 // How a search went.
@@ -615,10 +652,14 @@ typedef struct epi_relative_pose_estimate_f32 {
     uint32_t unobservable;
     // Poses found: 1 of a general motion, 1 or 2 of a plane, else 0.
     uint32_t pose_count;
+    // What became of a prior: one of `epi_prior_fit`.
+    uint32_t prior;
     // Rows of each covariance: 5, 8 or 3 by the verdict, 0 where the inliers leave a direction open.
     uint32_t covariance_size[2];
     // Robust estimate of the noise of one image coordinate, pixels; 0 without inliers.
     float noise_px;
+    // By how many standard deviations a prior and the pose found differ.
+    float prior_deviations;
     // Of view 2 in the frame of view 1, |t| = 1.
     struct epi_pose_f32 poses[2];
     // Of a plane: its unit normal in the frame of view 1.
@@ -751,7 +792,7 @@ typedef struct epi_absolute_pose_estimate_f32 {
     uint32_t unobservable;
     // Poses found: 1, of a plane 2, the more likely first; else 0.
     uint32_t pose_count;
-    // What became of a gravity prior: one of `epi_gravity_fit`.
+    // What became of a gravity prior: one of `epi_prior_fit`.
     uint32_t gravity;
     // For each pose 1 where there is a covariance, 0 where a direction is open.
     uint32_t has_covariance[2];
@@ -947,6 +988,18 @@ typedef struct epi_relative_pose_options_f64 {
     double max_error_px;
     // Standard deviation of the noise of one image coordinate, pixels; 0 for half of `max_error_px`.
     double sigma_px;
+    // Of gravity as a prior: its direction in view 1, of any length.
+    double prior_view1[3];
+    // Its direction in view 2.
+    double prior_view2[3];
+    // Standard deviation of each of the two directions, about each axis across it, rad.
+    double prior_sigma_rad;
+    // Of the rotation as a prior: a unit quaternion `i j k w`.
+    double prior_rotation[4];
+    // Covariance of w of `R <- Exp(w) R`, rad^2: 3x3 by rows.
+    double prior_covariance[3][3];
+    // What is known: one of `epi_relative_pose_prior`.
+    uint32_t prior;
 } epi_relative_pose_options_f64;
 
 // How a search went.
@@ -991,10 +1044,14 @@ typedef struct epi_relative_pose_estimate_f64 {
     uint32_t unobservable;
     // Poses found: 1 of a general motion, 1 or 2 of a plane, else 0.
     uint32_t pose_count;
+    // What became of a prior: one of `epi_prior_fit`.
+    uint32_t prior;
     // Rows of each covariance: 5, 8 or 3 by the verdict, 0 where the inliers leave a direction open.
     uint32_t covariance_size[2];
     // Robust estimate of the noise of one image coordinate, pixels; 0 without inliers.
     double noise_px;
+    // By how many standard deviations a prior and the pose found differ.
+    double prior_deviations;
     // Of view 2 in the frame of view 1, |t| = 1.
     struct epi_pose_f64 poses[2];
     // Of a plane: its unit normal in the frame of view 1.
@@ -1123,7 +1180,7 @@ typedef struct epi_absolute_pose_estimate_f64 {
     uint32_t unobservable;
     // Poses found: 1, of a plane 2, the more likely first; else 0.
     uint32_t pose_count;
-    // What became of a gravity prior: one of `epi_gravity_fit`.
+    // What became of a gravity prior: one of `epi_prior_fit`.
     uint32_t gravity;
     // For each pose 1 where there is a covariance, 0 where a direction is open.
     uint32_t has_covariance[2];
@@ -1284,7 +1341,7 @@ typedef struct epi_point_report_f64 {
 } epi_point_report_f64;
 
 // Every code, in falling order.
-#define epi_status_ALL { epi_status_Ok, epi_status_NullPointer, epi_status_Misaligned, epi_status_Overlap, epi_status_TooLarge, epi_status_Capacity, epi_status_Workspace, epi_status_StructSize, epi_status_UnknownEnum, epi_status_TooFew, epi_status_NotFinite, epi_status_Camera, epi_status_Rotation, epi_status_MaxError, epi_status_Sigma, epi_status_Confidence, epi_status_NoIterations, epi_status_Gravity, epi_status_NotVisible, epi_status_Unobservable, epi_status_NotAWindow, epi_status_FramesFull, epi_status_PointsFull, epi_status_ObservationsFull, epi_status_StaleFrame, epi_status_StalePoint, epi_status_DuplicateObservation, epi_status_NoSuchObservation, epi_status_NotPositive, epi_status_NotPositiveSemidefinite, epi_status_SameFrame, epi_status_ContradictoryFixedFrames, epi_status_NoPriorMemory, epi_status_BadOption, epi_status_NothingFree, epi_status_NoObservations, epi_status_NoUsablePoint, epi_status_UnconstrainedFrame, epi_status_Other, }
+#define epi_status_ALL { epi_status_Ok, epi_status_NullPointer, epi_status_Misaligned, epi_status_Overlap, epi_status_TooLarge, epi_status_Capacity, epi_status_Workspace, epi_status_StructSize, epi_status_UnknownEnum, epi_status_TooFew, epi_status_NotFinite, epi_status_Camera, epi_status_Rotation, epi_status_MaxError, epi_status_Sigma, epi_status_Confidence, epi_status_NoIterations, epi_status_Gravity, epi_status_NotVisible, epi_status_Unobservable, epi_status_NotAWindow, epi_status_FramesFull, epi_status_PointsFull, epi_status_ObservationsFull, epi_status_StaleFrame, epi_status_StalePoint, epi_status_DuplicateObservation, epi_status_NoSuchObservation, epi_status_NotPositive, epi_status_NotPositiveSemidefinite, epi_status_SameFrame, epi_status_ContradictoryFixedFrames, epi_status_NoPriorMemory, epi_status_BadOption, epi_status_NothingFree, epi_status_NoObservations, epi_status_NoUsablePoint, epi_status_UnconstrainedFrame, epi_status_Prior, epi_status_Start, epi_status_Other, }
 
 #ifdef __cplusplus
 extern "C" {

@@ -168,10 +168,10 @@ pub enum AbsolutePoseVerdict {
     Other = 6,
 }
 
-/// What became of a gravity prior.
+/// What became of a prior.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
-pub enum GravityFit {
+pub enum PriorFit {
     /// None was given, or no pose found.
     None = 0,
     /// It took part in the refinement.
@@ -210,4 +210,16 @@ pub enum Termination {
     NoProgress = 4,
     /// A reason that this version of the header does not name.
     Other = 5,
+}
+
+/// What is known of a relative pose beforehand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum RelativePosePrior {
+    /// Nothing; the fields of the others are ignored.
+    None = 0,
+    /// The direction of gravity in both views.
+    Gravity = 1,
+    /// The rotation.
+    Rotation = 2,
 }

@@ -20,10 +20,14 @@ pub struct RelativePoseEstimate<T> {
     pub unobservable: u32,
     /// Poses found: 1 of a general motion, 1 or 2 of a plane, else 0.
     pub pose_count: u32,
+    /// What became of a prior: one of `epi_prior_fit`.
+    pub prior: u32,
     /// Rows of each covariance: 5, 8 or 3 by the verdict, 0 where the inliers leave a direction open.
     pub covariance_size: [u32; 2],
     /// Robust estimate of the noise of one image coordinate, pixels; 0 without inliers.
     pub noise_px: T,
+    /// By how many standard deviations a prior and the pose found differ.
+    pub prior_deviations: T,
     /// Of view 2 in the frame of view 1, |t| = 1.
     pub poses: [Pose<T>; 2],
     /// Of a plane: its unit normal in the frame of view 1.
@@ -96,7 +100,7 @@ pub struct AbsolutePoseEstimate<T> {
     pub unobservable: u32,
     /// Poses found: 1, of a plane 2, the more likely first; else 0.
     pub pose_count: u32,
-    /// What became of a gravity prior: one of `epi_gravity_fit`.
+    /// What became of a gravity prior: one of `epi_prior_fit`.
     pub gravity: u32,
     /// For each pose 1 where there is a covariance, 0 where a direction is open.
     pub has_covariance: [u32; 2],
@@ -165,8 +169,10 @@ impl<T: Real> RelativePoseEstimate<T> {
             verdict: verdict as u32,
             unobservable: enums::Unobservable::No as u32,
             pose_count: 0,
+            prior: enums::PriorFit::None as u32,
             covariance_size: [0; 2],
             noise_px: T::ZERO,
+            prior_deviations: T::ZERO,
             poses: [Pose::zero(); 2],
             normals: [[T::ZERO; 3]; 2],
             baseline_over_distance: [T::ZERO; 2],
@@ -210,6 +216,13 @@ impl<T: Real> From<&estimate::RelativePoseEstimate<T>> for RelativePoseEstimate<
             Kernel::NoConsensus => Self::empty(C::NoConsensus),
             _ => Self::empty(C::Other),
         };
+        let (prior, sigmas) = match kernel.prior {
+            None => (enums::PriorFit::None, T::ZERO),
+            Some(estimate::PriorFit::Fits(sigmas)) => (enums::PriorFit::Fits, sigmas),
+            Some(estimate::PriorFit::Contradicted(sigmas)) => (enums::PriorFit::Contradicted, sigmas),
+            Some(_) => (enums::PriorFit::Other, T::ZERO),
+        };
+        (found.prior, found.prior_deviations) = (prior as u32, sigmas);
         found.report = kernel.report.into();
         found.noise_px = kernel.noise_px;
         found
@@ -281,7 +294,7 @@ impl<T: Real> From<&estimate::FundamentalEstimate<T>> for FundamentalEstimate<T>
 
 impl<T: Real> From<&estimate::AbsolutePoseEstimate<T>> for AbsolutePoseEstimate<T> {
     fn from(kernel: &estimate::AbsolutePoseEstimate<T>) -> Self {
-        use enums::{AbsolutePoseVerdict as C, GravityFit as Fit};
+        use enums::{AbsolutePoseVerdict as C, PriorFit as Fit};
         use estimate::{AbsolutePoseVerdict as Kernel, PriorFit};
         let (verdict, poses, unobservable) = match &kernel.verdict {
             Kernel::Pose(pose) => (C::Pose, core::slice::from_ref(pose), 0),

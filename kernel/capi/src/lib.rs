@@ -23,6 +23,7 @@ extern crate std;
 
 pub mod enums;
 pub mod estimates;
+mod layout;
 pub mod limits;
 pub mod options;
 mod raw;

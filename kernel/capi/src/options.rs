@@ -8,7 +8,7 @@ use epipole::{estimate, refine};
 use crate::Status;
 use crate::enums;
 use crate::raw::Grows;
-use crate::types::{Pose, from_rows};
+use crate::types::{Pose, from_rows, rotation};
 
 /// Options of `epi_relative_pose`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +32,18 @@ pub struct RelativePoseOptions<T> {
     pub max_error_px: T,
     /// Standard deviation of the noise of one image coordinate, pixels; 0 for half of `max_error_px`.
     pub sigma_px: T,
+    /// Of gravity as a prior: its direction in view 1, of any length.
+    pub prior_view1: [T; 3],
+    /// Its direction in view 2.
+    pub prior_view2: [T; 3],
+    /// Standard deviation of each of the two directions, about each axis across it, rad.
+    pub prior_sigma_rad: T,
+    /// Of the rotation as a prior: a unit quaternion `i j k w`.
+    pub prior_rotation: [T; 4],
+    /// Covariance of w of `R <- Exp(w) R`, rad^2: 3x3 by rows.
+    pub prior_covariance: [[T; 3]; 3],
+    /// What is known: one of `epi_relative_pose_prior`.
+    pub prior: u32,
 }
 
 /// Options of `epi_homography`.
@@ -202,7 +214,15 @@ macro_rules! search_options {
     };
 }
 
-search_options!(RelativePoseOptions);
+search_options!(
+    RelativePoseOptions,
+    prior_view1: [T::ZERO; 3],
+    prior_view2: [T::ZERO; 3],
+    prior_sigma_rad: T::ZERO,
+    prior_rotation: [T::ZERO; 4],
+    prior_covariance: [[T::ZERO; 3]; 3],
+    prior: enums::RelativePosePrior::None as u32
+);
 search_options!(HomographyOptions);
 search_options!(FundamentalOptions);
 search_options!(
@@ -215,7 +235,24 @@ search_options!(
 
 impl<T: Real> RelativePoseOptions<T> {
     pub(crate) fn to_kernel(self) -> Result<estimate::RelativePoseOptions<T>, Status> {
-        Ok(self.search())
+        const NONE: u32 = enums::RelativePosePrior::None as u32;
+        const GRAVITY: u32 = enums::RelativePosePrior::Gravity as u32;
+        const ROTATION: u32 = enums::RelativePosePrior::Rotation as u32;
+        let mut kernel = self.search();
+        kernel.prior = match self.prior {
+            NONE => None,
+            GRAVITY => Some(estimate::RelativePosePrior::Gravity {
+                view1: self.prior_view1.into(),
+                view2: self.prior_view2.into(),
+                sigma_rad: self.prior_sigma_rad,
+            }),
+            ROTATION => Some(estimate::RelativePosePrior::Rotation {
+                rotation: rotation(&self.prior_rotation)?,
+                covariance: from_rows(self.prior_covariance),
+            }),
+            _ => return Err(Status::UnknownEnum),
+        };
+        Ok(kernel)
     }
 }
 

@@ -243,3 +243,63 @@ macro_rules! lend {
     };
 }
 pub(crate) use lend;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A struct of a second version, of which the first had two fields.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    #[repr(C)]
+    struct Grown {
+        size: u32,
+        old: u32,
+        new: u32,
+    }
+    // SAFETY: numbers that begin with the size.
+    unsafe impl Grows for Grown {
+        const FIRST: usize = 8;
+    }
+    const DEFAULT: Grown = Grown { size: 12, old: 1, new: 2 };
+
+    #[test]
+    fn an_older_caller_gets_defaults_for_what_it_does_not_know() {
+        // SAFETY: as long as its first number says.
+        let (read, bytes) = unsafe { read_options([8u32, 7].as_ptr().cast::<Grown>(), DEFAULT) }.unwrap();
+        assert_eq!((read.old, read.new, bytes.len()), (7, 2, 8));
+        let whole = Grown { size: 12, old: 7, new: 9 };
+        // SAFETY: as long as its first number says.
+        assert_eq!(unsafe { read_options(&whole, DEFAULT) }.unwrap().0, whole);
+        for size in [0u32, 7, 13, 16, u32::MAX] {
+            // SAFETY: no more than the first number is read.
+            let read = unsafe { read_options([size, 7, 0, 0].as_ptr().cast::<Grown>(), DEFAULT) };
+            assert_eq!(read.unwrap_err(), Status::StructSize);
+        }
+    }
+
+    #[test]
+    fn an_older_caller_is_written_what_it_knows() {
+        let mut memory = [5u32; 3];
+        // SAFETY: eight bytes are there.
+        unsafe { OutputStruct::new(memory.as_mut_ptr().cast::<Grown>(), 8) }.unwrap().write(&DEFAULT);
+        assert_eq!(memory, [12, 1, 5]);
+    }
+
+    #[test]
+    fn outputs_overlap_nothing() {
+        assert_eq!(disjoint(&[0..4, 8..12], &[4..8, 12..20]), Ok(()));
+        assert_eq!(disjoint(&[0..4], &[3..8]), Err(Status::Overlap));
+        assert_eq!(disjoint(&[], &[0..4, 10..12, 3..5]), Err(Status::Overlap));
+        assert_eq!(disjoint(&[0..8, 2..4], &[]), Ok(()));
+    }
+
+    #[test]
+    fn an_output_stops_at_its_end() {
+        let mut memory = [0u32; 3];
+        // SAFETY: two of the three.
+        let mut output = unsafe { Output::<u32>::new(memory.as_mut_ptr(), 2) }.unwrap();
+        assert_eq!(output.write([7, 8, 9]), 2);
+        assert_eq!((output.holding(2), output.holding(3)), (Ok(()), Err(Status::Capacity)));
+        assert_eq!(memory, [7, 8, 0]);
+    }
+}

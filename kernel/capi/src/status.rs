@@ -92,13 +92,17 @@ pub enum Status {
     NoUsablePoint = -36,
     /// A free frame has no observation of a usable point, no prior and no distance.
     UnconstrainedFrame = -37,
+    /// A prior needs finite directions or a rotation, and a positive uncertainty.
+    Prior = -38,
+    /// The pose to start from has a translation of zero.
+    Start = -39,
     /// An error that this version of the header does not name.
-    Other = -38,
+    Other = -40,
 }
 
 impl Status {
     /// Every code, in falling order.
-    pub const ALL: [Self; 39] = [
+    pub const ALL: [Self; 41] = [
         Self::Ok,
         Self::NullPointer,
         Self::Misaligned,
@@ -137,6 +141,8 @@ impl Status {
         Self::NoObservations,
         Self::NoUsablePoint,
         Self::UnconstrainedFrame,
+        Self::Prior,
+        Self::Start,
         Self::Other,
     ];
 
@@ -180,6 +186,8 @@ impl Status {
             Self::NoObservations => c"no observations",
             Self::NoUsablePoint => c"no point is seen twice",
             Self::UnconstrainedFrame => c"nothing constrains a free frame",
+            Self::Prior => c"a prior needs finite directions or a rotation, and a positive uncertainty",
+            Self::Start => c"the pose to start from has a translation of zero",
             Self::Other => c"an error without a name in this version",
         }
     }
@@ -235,6 +243,8 @@ impl From<TwoViewError> for Status {
         match error {
             TwoViewError::Input(error) => error.into(),
             TwoViewError::Options(error) => error.into(),
+            TwoViewError::Pose => Self::Start,
+            TwoViewError::Prior => Self::Prior,
             _ => Self::Other,
         }
     }

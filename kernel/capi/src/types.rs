@@ -2,13 +2,15 @@
 
 use epipole::Real;
 use epipole::geometry::triangulation::{self, Triangulation};
-use epipole::geometry::{self, BrownConrady, KannalaBrandt, Pinhole};
-use epipole::nalgebra::{Quaternion, SMatrix, Translation3, UnitQuaternion, Vector3};
+use epipole::geometry::{self, BrownConrady, CameraModel, KannalaBrandt, Pinhole, UnprojectError};
+use epipole::nalgebra::{
+    Matrix2x3, Matrix3x2, Quaternion, SMatrix, Translation3, UnitQuaternion, Vector2, Vector3,
+};
 use epipole::real::{abs, is_finite, lit};
 use epipole::robust::{self, RansacReport};
 
 use crate::Status;
-use crate::enums::{self, CameraModel};
+use crate::enums::{self, CameraModel as Model};
 use crate::raw::Plain;
 
 /// A pose into the camera, `x_cam = R X + t`; of two views, `X2 = R X1 + t`.
@@ -160,17 +162,55 @@ impl<T: Real> From<geometry::Pose<T>> for Pose<T> {
 impl<T: Real> Camera<T> {
     /// The camera of the kernel.
     pub(crate) fn to_kernel(self) -> Result<geometry::Camera<T>, Status> {
-        const PINHOLE: u32 = CameraModel::Pinhole as u32;
-        const BROWN_CONRADY: u32 = CameraModel::BrownConrady as u32;
-        const KANNALA_BRANDT: u32 = CameraModel::KannalaBrandt as u32;
+        const PINHOLE: u32 = Model::Pinhole as u32;
+        const BROWN_CONRADY: u32 = Model::BrownConrady as u32;
+        const KANNALA_BRANDT: u32 = Model::KannalaBrandt as u32;
         let pinhole = Pinhole::new(self.fx, self.fy, self.cx, self.cy);
         let [a, b, c, d, e, ..] = self.distortion;
         Ok(match self.model {
             PINHOLE => pinhole?.into(),
             BROWN_CONRADY => BrownConrady::new(pinhole?, [a, b, c, d, e])?.into(),
-            KANNALA_BRANDT => KannalaBrandt::new(pinhole?, [a, b, c, d])?.into(),
+            KANNALA_BRANDT if cfg!(feature = "fisheye") => KannalaBrandt::new(pinhole?, [a, b, c, d])?.into(),
             _ => return Err(Status::UnknownEnum),
         })
+    }
+}
+
+/// A camera as the estimators see it. Without fisheyes their code for bearings is dropped, half of their size.
+pub(crate) struct Lens<T: Real>(geometry::Camera<T>);
+
+impl<T: Real> Camera<T> {
+    pub(crate) fn to_lens(self) -> Result<Lens<T>, Status> {
+        self.to_kernel().map(Lens)
+    }
+}
+
+impl<T: Real> CameraModel<T> for Lens<T> {
+    fn project(&self, point: &Vector3<T>) -> Option<Vector2<T>> {
+        self.0.project(point)
+    }
+    fn project_with_jacobian(&self, point: &Vector3<T>) -> Option<(Vector2<T>, Matrix2x3<T>)> {
+        self.0.project_with_jacobian(point)
+    }
+    fn unproject(&self, pixel: &Vector2<T>) -> Result<Vector3<T>, UnprojectError> {
+        self.0.unproject(pixel)
+    }
+    fn unproject_with_jacobian(
+        &self,
+        pixel: &Vector2<T>,
+    ) -> Result<(Vector3<T>, Matrix3x2<T>), UnprojectError> {
+        self.0.unproject_with_jacobian(pixel)
+    }
+    fn focal(&self) -> T {
+        self.0.focal()
+    }
+    #[inline(always)]
+    fn rectilinear(&self) -> Option<(T, T)> {
+        if cfg!(feature = "fisheye") {
+            return self.0.rectilinear();
+        }
+        let pinhole = self.0.pinhole();
+        Some((pinhole.fx(), pinhole.fy()))
     }
 }
 

@@ -179,7 +179,7 @@ pub unsafe extern "C" fn relative_pose_guided(
         // SAFETY: the caller's promise.
         let mut lent = unsafe { Lent::new(inputs, scores, count, options, room, answer, inliers)? };
         let options = lent.options.to_kernel()?;
-        let (camera1, camera2) = (camera1.value()?.to_kernel()?, camera2.value()?.to_kernel()?);
+        let (camera1, camera2) = (camera1.value()?.to_lens()?, camera2.value()?.to_lens()?);
         let ordinary = camera1.rectilinear().is_some() && camera2.rectilinear().is_some();
         let width = if ordinary { TWO_VIEW_NUMBERS } else { TWO_VIEW_WIDE_NUMBERS };
         let slices = lent.memory.cut::<Scalar>(width, count)?;
@@ -509,7 +509,7 @@ pub unsafe extern "C" fn absolute_pose_guided(
         // SAFETY: the caller's promise.
         let mut lent = unsafe { Lent::new(inputs, scores, count, options, room, answer, inliers)? };
         let options = lent.options.to_kernel()?;
-        let camera = camera.value()?.to_kernel()?;
+        let camera = camera.value()?.to_lens()?;
         let ordinary = camera.rectilinear().is_some();
         let width = if ordinary { ABSOLUTE_POSE_NUMBERS } else { ABSOLUTE_POSE_WIDE_NUMBERS };
         let slices = lent.memory.cut::<Scalar>(width, count)?;
@@ -574,7 +574,7 @@ pub unsafe extern "C" fn refine_relative_pose(
         disjoint(&[start.bytes()], &[lent.memory.bytes(), lent.estimate.bytes(), lent.inliers.bytes()])?;
         let options = lent.options.to_kernel()?;
         let start = start.value()?.to_kernel()?;
-        let (camera1, camera2) = (camera1.value()?.to_kernel()?, camera2.value()?.to_kernel()?);
+        let (camera1, camera2) = (camera1.value()?.to_lens()?, camera2.value()?.to_lens()?);
         let ordinary = camera1.rectilinear().is_some() && camera2.rectilinear().is_some();
         let width = if ordinary { TWO_VIEW_NUMBERS } else { TWO_VIEW_WIDE_NUMBERS };
         let slices = lent.memory.cut::<Scalar>(width, count)?;
@@ -642,7 +642,7 @@ pub unsafe extern "C" fn refine_absolute_pose(
         let inputs = [camera.bytes(), pixels.bytes(), points.bytes(), start.bytes(), options_bytes];
         disjoint(&inputs, &[refined.bytes()])?;
         let options = options.to_kernel()?;
-        let (camera, start) = (camera.value()?.to_kernel()?, start.value()?.to_kernel()?);
+        let (camera, start) = (camera.value()?.to_lens()?, start.value()?.to_kernel()?);
         let found = refine::absolute_pose(&camera, pixels.slice, points.slice, &start, &options)?;
         refined.write(&RefinedAbsolutePose::from(&found));
         Ok(1)

@@ -237,7 +237,9 @@ enum Lens<T> {
     Wide(Units<T>),
 }
 
-/// Checks the input and loads it; nothing is touched in case of an error.
+/// Checks the input and loads it; nothing is touched in case of an error. Inlined: for cameras that are never a fisheye the
+/// compiler then drops all that works on bearings.
+#[inline(always)]
 fn load<T: Real>(
     camera1: &impl CameraModel<T>,
     camera2: &impl CameraModel<T>,
