@@ -288,7 +288,7 @@ mod tests {
     #[test]
     fn outputs_overlap_nothing() {
         assert_eq!(disjoint(&[0..4, 8..12], &[4..8, 12..20]), Ok(()));
-        assert_eq!(disjoint(&[0..4], &[3..8]), Err(Status::Overlap));
+        assert_eq!(disjoint(&[9..10, 0..4], &[3..8, 20..21]), Err(Status::Overlap));
         assert_eq!(disjoint(&[], &[0..4, 10..12, 3..5]), Err(Status::Overlap));
         assert_eq!(disjoint(&[0..8, 2..4], &[]), Ok(()));
     }
