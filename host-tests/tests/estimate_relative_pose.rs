@@ -365,9 +365,12 @@ fn covariance_is_calibrated() {
 #[test]
 fn rotation_covariance_is_calibrated() {
     let (mut sum, mut trials) = (0.0, 0);
+    // Small turns too.
+    let mut options = options();
+    options.least_motion_px = Some(0.0);
     for_each_case(500, |seed, _| {
         let problem = Scene::new(Motion::PureRotation, 60).noise_px(0.5).generate(seed);
-        let (estimate, _) = estimate_scene::<f64>(&problem, &options()).unwrap();
+        let (estimate, _) = estimate_scene::<f64>(&problem, &options).unwrap();
         if let RelativePoseVerdict::PureRotation(found) = &estimate.verdict {
             let w = (problem.pose.rotation * found.rotation.inverse()).scaled_axis();
             sum += (w.transpose() * found.covariance.unwrap().try_inverse().unwrap() * w).x;
@@ -376,4 +379,28 @@ fn rotation_covariance_is_calibrated() {
     });
     let mean = sum / trials as f64;
     assert!(trials >= 490 && (2.5..3.5).contains(&mean), "{trials} {mean}");
+}
+
+/// A camera that turns by less than the least motion of interest has not moved; what is of interest is the caller's.
+#[test]
+fn a_tremble_is_no_motion() {
+    let camera = scene_camera();
+    for_each_case(20, |seed, _| {
+        let problem = Scene::new(Motion::Still, 100).noise_px(0.2).outliers(0.2).generate(seed);
+        let (x1, mut x2) = problem.pixels::<f64>();
+        // About an eighth of a degree about the vertical.
+        x2.iter_mut().for_each(|x| x.x += 1.5);
+        let mut options = options();
+        options.max_error_px = 1.0;
+        options.sigma_px = Some(0.3);
+        let verdict = |least_motion_px: f64| {
+            let mut options = options;
+            options.least_motion_px = Some(least_motion_px);
+            let mut memory = Memory::new(100);
+            let mut workspace = memory.workspace();
+            relative_pose(&camera, &camera, &x1, &x2, &options, &mut workspace).unwrap().verdict
+        };
+        assert!(matches!(verdict(2.5), RelativePoseVerdict::NoMotion));
+        assert!(!matches!(verdict(0.0), RelativePoseVerdict::NoMotion));
+    });
 }

@@ -251,7 +251,7 @@ pub(super) fn judgement<T: Real, B: EpipolarBlock<T>>(
     order: &mut [u32],
 ) -> Aided<T> {
     let problem = PoseProblem { prior: Some((*known, plain.sigma * plain.sigma)), ..*plain.problem };
-    let aided = Judge { problem: &problem, sigma: plain.sigma, seed: plain.seed };
+    let aided = Judge { problem: &problem, ..*plain };
     let Guide { scores, mut keep_going } = guide;
     // Reborrowed, for a second search may need it.
     let ask = keep_going.as_mut().map(|ask| &mut **ask as &mut dyn FnMut(&_) -> bool);

@@ -27,6 +27,8 @@ pub(super) struct Judge<'a, 'b, T: Real, B> {
     pub(super) problem: &'a PoseProblem<'b, T, B>,
     /// Standard deviation of a coordinate in the blocks' unit, as the options have it.
     pub(super) sigma: T,
+    /// Displacement in the blocks' unit up to which a correspondence may stand still.
+    pub(super) least_motion: T,
     pub(super) seed: u64,
 }
 
@@ -42,6 +44,8 @@ const PLANE_THRESHOLD: f64 = 1.25;
 /// A plane must explain so many in twenty of the pose's inliers to be the verdict; of a planar scene it explains all but
 /// accidents.
 const PLANE_SHARE_OF_20: u32 = 17;
+/// Of a scene that stands still at the most one inlier in as many moves by twice the least motion.
+const MOVED_ONE_IN: u32 = 10;
 /// Inliers of which a line is believed where they agree with a pose no better than chance.
 const LEAST_LINE: usize = 15;
 
@@ -111,6 +115,10 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
             return Judgement { verdict: RelativePoseVerdict::Unobservable(Unobservable::Collinear), noise };
         }
         let evidence = Evidence { problem, inliers: mask, epipolar: refined.matrix(), sigma, accident };
+        if self.hardly_moves(&evidence) {
+            let still = RotationModel { rotation: Matrix3::identity(), scales: problem.scales };
+            return self.turned(&still, true, self.least_motion / lit(EXPLAINED_SIGMAS), mask);
+        }
         if let Some(rotation) = evidence.rotation(&refined) {
             let explained = evidence.explained(&rotation.matrix());
             if !evidence.proves_parallax(count, &explained, 3) {
@@ -231,6 +239,23 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                 *inlier = s < limit;
             }
         }
+    }
+
+    /// True where at least half of all correspondences are displaced by less than the least motion of interest, and hardly
+    /// any inlier of the pose by more than twice as much.
+    fn hardly_moves(&self, evidence: &Evidence<'_, '_, T, B>) -> bool {
+        let still = RotationModel { rotation: Matrix3::identity(), scales: self.problem.scales }.matrix();
+        let sigma = self.least_motion / lit(EXPLAINED_SIGMAS);
+        if !(sigma > T::ZERO) {
+            return false;
+        }
+        let displaced_below = |sigma: T| Evidence { sigma, ..*evidence }.explained(&still);
+        let near = displaced_below(sigma);
+        if 2 * near.all < self.problem.data.count as u32 {
+            return false;
+        }
+        let far = displaced_below(sigma * T::TWO);
+        MOVED_ONE_IN * far.others <= far.inliers + far.others
     }
 
     /// True where a rotation moves the points by no more than the noise.

@@ -2,12 +2,14 @@
 
 use nalgebra::Vector2;
 
+use super::chance::EXPLAINED_SIGMAS;
 use super::error::TwoViewError;
 use super::load::{Units, check_pixels, load_bearings, load_planes};
 use super::workspace::RelativePoseWorkspace;
 use crate::geometry::{CameraModel, Pose};
 use crate::linalg::LANES;
 use crate::real::is_finite;
+use crate::real::lit;
 use crate::refine::blocks::{BearingBlock, BlockSlice, EpipolarBlock, PlaneBlock};
 use crate::robust::budget::check_noise;
 use crate::robust::{Guide, RansacOptions, ransac};
@@ -39,6 +41,10 @@ pub struct RelativePoseOptions<T: Real> {
     pub max_error_px: T,
     /// Standard deviation of the noise of one image coordinate, pixels. Default: half of `max_error_px`.
     pub sigma_px: Option<T>,
+    /// Displacement between the views, pixels, that is no motion where at least half of all correspondences stay below
+    /// it and at most one inlier in ten moves by twice as much. Default: 5 sigma, that is two and a half times
+    /// `max_error_px`; 0 leaves the decision to the noise alone.
+    pub least_motion_px: Option<T>,
     /// Gravity or the rotation, if known: then samples are smaller, and it enters the refinement. A prior that contradicts
     /// the correspondences is left aside and reported. Default none.
     pub prior: Option<RelativePosePrior<T>>,
@@ -48,7 +54,13 @@ pub struct RelativePoseOptions<T: Real> {
 
 impl<T: Real> Default for RelativePoseOptions<T> {
     fn default() -> Self {
-        Self { max_error_px: T::ONE, sigma_px: None, prior: None, ransac: RansacOptions::default() }
+        Self {
+            max_error_px: T::ONE,
+            sigma_px: None,
+            least_motion_px: None,
+            prior: None,
+            ransac: RansacOptions::default(),
+        }
     }
 }
 
@@ -94,7 +106,8 @@ pub type RelativePoseError = TwoViewError;
 ///
 /// # Degeneracies
 /// See [`RelativePoseVerdict`]: none of them ends in a general pose. A plane is the verdict where it explains at least
-/// 17 in 20 inliers; no motion where the mean square motion is below the noise.
+/// 17 in 20 inliers; no motion where the mean square motion is below the noise, or
+/// where the views hardly differ ([`RelativePoseOptions::least_motion_px`]).
 ///
 /// # Accuracy
 /// That of a maximum-likelihood fit to the inliers (Tukey's loss, ending at two thresholds), in `f32` as in `f64`.
@@ -359,7 +372,7 @@ fn refine<T: Real, B: EpipolarBlock<T>>(
     let blocks = blocks.get(..count.div_ceil(LANES)).unwrap_or(blocks);
     let threshold = options.max_error_px / units.pixels;
     let problem = PoseProblem::new(BlockSlice { blocks, count }, units.scales, threshold);
-    let judge = Judge { problem: &problem, sigma: sigma_px / units.pixels, seed: 0 };
+    let judge = Judge { problem: &problem, sigma: sigma_px / units.pixels, least_motion: T::ZERO, seed: 0 };
     let mask = workspace.inliers.get_mut(..count).unwrap_or_default();
     let plain = judge.refined(pose, mask)?;
     match known.filter(|known| known.fits(&plain)) {
@@ -388,7 +401,12 @@ fn estimate<T: Real, B: EpipolarBlock<T>>(
     let blocks = blocks.get(..count.div_ceil(LANES)).unwrap_or(blocks);
     let data = BlockSlice { blocks, count };
     let problem = PoseProblem::new(data, units.scales, options.max_error_px / units.pixels);
-    let judge = Judge { problem: &problem, sigma: sigma_px / units.pixels, seed: options.ransac.seed };
+    let judge = Judge {
+        problem: &problem,
+        sigma: sigma_px / units.pixels,
+        least_motion: options.least_motion_px.unwrap_or(sigma_px * lit(EXPLAINED_SIGMAS)) / units.pixels,
+        seed: options.ransac.seed,
+    };
     let (mask, order) = (workspace.inliers.get_mut(..count).unwrap_or_default(), &mut *workspace.order);
     let Aided { judgement, mut report, fit } = match &known {
         Some(known) => aided::judgement(&judge, known, &options.ransac, guide, mask, order),
