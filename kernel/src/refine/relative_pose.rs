@@ -138,7 +138,7 @@ impl<T: Real> Manifold<T, 5> for PoseModel<T> {
 
     fn tangents(&self) -> [[T; 9]; 5] {
         let basis = tangent_basis(&self.translation);
-        let (u, v): (Vector3<T>, Vector3<T>) = (basis.column(0).into(), basis.column(1).into());
+        let [u, v] = basis.data.0.map(Vector3::from);
         let t = &self.translation.data.0[0];
         let (s1, s2) = (self.scales.inverse1(), self.scales.inverse2());
         let (s1, s2) = ([s1[0], s1[1], T::ONE], [s2[0], s2[1], T::ONE]);
@@ -178,7 +178,7 @@ impl<T: Real> Manifold<T, 5> for PoseModel<T> {
     fn retract(&self, step: &SVector<T, 5>) -> Self {
         let s = &step.data.0[0];
         let basis = tangent_basis(&self.translation);
-        let (u, v): (Vector3<T>, Vector3<T>) = (basis.column(0).into(), basis.column(1).into());
+        let [u, v] = basis.data.0.map(Vector3::from);
         let t = self.translation + u * s[3] + v * s[4];
         Self {
             rotation: cayley(&Vector3::new(s[0], s[1], s[2])) * self.rotation,

@@ -112,7 +112,11 @@ impl<T: Real> ReprojectionBlock<T> for BearingPointBlock<T> {
 
     #[inline(always)]
     fn rows(&self, l: usize, _: [T; 2]) -> [[T; 3]; 3] {
-        core::array::from_fn(|k| [self[3 * k][l], self[3 * k + 1][l], self[3 * k + 2][l]])
+        let mut rows = [[T::ZERO; 3]; 3];
+        for k in 0..3 {
+            rows[k] = [self[3 * k][l], self[3 * k + 1][l], self[3 * k + 2][l]];
+        }
+        rows
     }
 }
 
