@@ -191,7 +191,7 @@ impl<T: Real> Residual<T> {
         let d = row.dot(&row);
         let inverse = if d > T::MIN_POSITIVE { T::ONE / d } else { T::ZERO };
         let root = sqrt(inverse);
-        let first = [0, 1, 2, 3, 4].map(|p| Row::of(&curve.first[p], a, b));
+        let first = curve.first.each_ref().map(|lines| Row::of(lines, a, b));
         let mut residual = Self { row, first, inverse, root, value: row.c * root, slope: [T::ZERO; 5] };
         for p in 0..5 {
             residual.slope[p] = residual.derivative(&first[p]);
