@@ -8,6 +8,7 @@
 
 pub mod bundle;
 pub mod cases;
+pub mod dial;
 pub mod matchers;
 pub mod oracle;
 pub mod rng;
