@@ -11,7 +11,8 @@ fn main() {
     let mut names: Vec<&str> = text
         .split_inclusive('(')
         .filter_map(|piece| {
-            let name = piece.strip_suffix('(')?.rsplit(|c: char| !c.is_ascii_alphanumeric() && c != '_').next()?;
+            let name =
+                piece.strip_suffix('(')?.rsplit(|c: char| !c.is_ascii_alphanumeric() && c != '_').next()?;
             let line = piece.rsplit('\n').next()?;
             (name.starts_with("epi_") && !line.starts_with([' ', '*', '/', '#'])).then_some(name)
         })
