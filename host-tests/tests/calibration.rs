@@ -1,8 +1,11 @@
 //! Covariances against Monte Carlo: the normalised squared error of an estimate has as its mean the number of its degrees
 //! of freedom. 250 trials a row, or as many as `EPIPOLE_TRIALS` says. General poses and rotations without outliers must
-//! lie within the two-sided 95 % bounds of that number of trials. Everywhere the mean must lie within 0.85 and 1.15 of the
-//! freedom: over 1,000 trials poses led astray by outliers (beyond six times the freedom, at most 2 in 100) are counted and not averaged; without them
-//! general poses and rotations measure 1.00 to 1.04, and planes measure 1.04 to 1.05 (pose) and 1.05 to 1.07 (corners), beyond their 95 % (1.044).
+//! lie within the two-sided 95 % bounds of that number of trials; every other row within 0.85 and 1.15 of the freedom,
+//! where poses that outliers led astray (beyond six times the freedom, at most 2 in 100) are counted and not averaged.
+//!
+//! 1,000 trials with nothing set aside measured, over the freedom: without outliers general poses 1.00, rotations 1.00 to
+//! 1.01; among 20 % outliers general poses 1.06 to 1.08; planes 1.04 to 1.05 and homographies 1.05 to 1.07 with and
+//! without. What is above 1.044 to 1.056 is beyond its 95 %: these covariances are a little too small, and why is open.
 
 use epipole::estimate::{
     GeneralMotion, HomographyOptions, HomographyVerdict, PlanarPose, RelativePoseOptions,
