@@ -178,10 +178,10 @@ pub fn abs<T: Real>(x: T) -> T {
     x.raw_abs()
 }
 
-/// The magnitude of `x` with the sign of `sign`, without a comparison.
+/// The magnitude of `x` with the sign of `sign`. NaN counts as positive: its sign bit is the target's choice.
 #[inline(always)]
 pub(crate) fn copysign<T: Real>(x: T, sign: T) -> T {
-    x.raw_copysign(sign)
+    x.raw_copysign(if sign <= T::ZERO || sign > T::ZERO { sign } else { T::ONE })
 }
 
 /// The larger of two numbers; `b` where they do not compare.

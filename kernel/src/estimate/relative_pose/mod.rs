@@ -342,13 +342,12 @@ pub fn refine_relative_pose<T: Real>(
     options: &RelativePoseOptions<T>,
     workspace: &mut RelativePoseWorkspace<'_, T>,
 ) -> Result<Option<GeneralMotion<T>>, RelativePoseError> {
-    check_noise(options.max_error_px, options.sigma_px)?;
+    let sigma_px = check_noise(options.max_error_px, options.sigma_px)?;
     let t = &pose.translation.vector;
     let finite = pose.rotation.coords.iter().chain(t.iter()).all(|&x| is_finite(x));
     if !finite || t.iter().all(|&x| x == T::ZERO) {
         return Err(RelativePoseError::Pose);
     }
-    let sigma_px = check_noise(options.max_error_px, options.sigma_px)?;
     let known = options.known()?;
     let lens = load(camera1, camera2, x1, x2, &Guide::none(), workspace)?;
     Ok(match lens {
@@ -378,7 +377,9 @@ fn refine<T: Real, B: EpipolarBlock<T>>(
     match known.filter(|known| known.fits(&plain)) {
         Some(known) => {
             let problem = PoseProblem { prior: Some((known, judge.sigma * judge.sigma)), ..problem };
-            Judge { problem: &problem, ..judge }.refined(&plain.pose, mask)
+            let aided = Judge { problem: &problem, ..judge }.refined(&plain.pose, mask);
+            // The mask is of the last refinement: without an aided one, of the plain one again.
+            if aided.is_some() { aided } else { judge.refined(pose, mask) }
         }
         None => Some(plain),
     }

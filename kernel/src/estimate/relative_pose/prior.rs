@@ -152,34 +152,37 @@ impl<T: Real> KnownRotation<T> {
         }
     }
 
-    /// True where the prior agrees with a pose that was found without it.
+    /// True where nothing speaks against the prior in a pose that was found without it: a pose whose covariance is not
+    /// known tells nothing.
     pub(super) fn fits(&self, motion: &GeneralMotion<T>) -> bool {
-        let fit = self.fit(&motion.pose.rotation, &rotation_block(&motion.covariance));
-        matches!(fit, PriorFit::Fits(_))
+        !matches!(self.fit_of(&motion.pose.rotation, &motion.covariance), Some(PriorFit::Contradicted(_)))
+    }
+
+    /// [`Self::fit`] with the rotation's part of a covariance; none without one.
+    fn fit_of<const P: usize>(
+        &self,
+        rotation: &UnitQuaternion<T>,
+        covariance: &Option<SMatrix<T, P, P>>,
+    ) -> Option<PriorFit<T>> {
+        covariance.as_ref().map(|covariance| self.fit(rotation, &rotation_block(covariance)))
     }
 
     /// How the prior agrees with a verdict that was found without it; none where the verdict knows of no rotation.
     pub(super) fn agreement(&self, verdict: &RelativePoseVerdict<T>) -> Option<PriorFit<T>> {
         match verdict {
-            RelativePoseVerdict::General(motion) => {
-                Some(self.fit(&motion.pose.rotation, &rotation_block(&motion.covariance)))
-            }
+            RelativePoseVerdict::General(motion) => self.fit_of(&motion.pose.rotation, &motion.covariance),
             RelativePoseVerdict::Planar(poses) => {
                 // Whichever of the two is right: the nearer one.
-                let mut fits = poses
+                let nearer = |best: Option<PriorFit<T>>, fit: PriorFit<T>| match best {
+                    Some(best) if deviations(&best) <= deviations(&fit) => Some(best),
+                    _ => Some(fit),
+                };
+                poses
                     .iter()
-                    .map(|planar| self.fit(&planar.pose.rotation, &rotation_block(&planar.covariance)));
-                let first = fits.next()?;
-                Some(
-                    fits.fold(
-                        first,
-                        |best, fit| if deviations(&fit) < deviations(&best) { fit } else { best },
-                    ),
-                )
+                    .filter_map(|planar| self.fit_of(&planar.pose.rotation, &planar.covariance))
+                    .fold(None, nearer)
             }
-            RelativePoseVerdict::PureRotation(found) => {
-                Some(self.fit(&found.rotation, &rotation_block(&found.covariance)))
-            }
+            RelativePoseVerdict::PureRotation(found) => self.fit_of(&found.rotation, &found.covariance),
             RelativePoseVerdict::NoMotion => {
                 let identity = UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(
                     T::ONE,
@@ -205,15 +208,13 @@ fn deviations<T: Real>(fit: &PriorFit<T>) -> T {
     }
 }
 
-/// The rotation's part of a covariance; zero without one.
-fn rotation_block<T: Real, const P: usize>(covariance: &Option<SMatrix<T, P, P>>) -> Matrix3<T> {
+/// The rotation's part of a covariance.
+fn rotation_block<T: Real, const P: usize>(covariance: &SMatrix<T, P, P>) -> Matrix3<T> {
     const { assert!(P >= 3, "the rotation comes first") };
     let mut block = Matrix3::zeros();
-    if let Some(covariance) = covariance {
-        for q in 0..3 {
-            for p in 0..3 {
-                block.data.0[q][p] = covariance.data.0[q][p];
-            }
+    for q in 0..3 {
+        for p in 0..3 {
+            block.data.0[q][p] = covariance.data.0[q][p];
         }
     }
     block
