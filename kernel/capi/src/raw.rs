@@ -39,7 +39,7 @@ const _: () = {
 pub(crate) type Bytes = Range<usize>;
 
 /// The addresses of `count` elements, which could be a slice.
-fn bytes_of<V>(pointer: *const V, count: usize) -> Result<Bytes, Status> {
+pub(crate) fn bytes_of<V>(pointer: *const V, count: usize) -> Result<Bytes, Status> {
     if pointer.is_null() {
         return Err(Status::NullPointer);
     }
@@ -220,7 +220,7 @@ impl<E: Grows> OutputStruct<'_, E> {
 
 /// No output overlaps an input or another output.
 pub(crate) fn disjoint(inputs: &[Bytes], outputs: &[Bytes]) -> Result<(), Status> {
-    let overlap = |a: &Bytes, b: &Bytes| a.start < b.end && b.start < a.end;
+    let overlap = |a: &Bytes, b: &Bytes| !a.is_empty() && !b.is_empty() && a.start < b.end && b.start < a.end;
     let mut rest = outputs.iter();
     while let Some(output) = rest.next() {
         if inputs.iter().chain(rest.clone()).any(|other| overlap(output, other)) {

@@ -1,5 +1,6 @@
 //! A window of bundle adjustment in the caller's memory: its head, then the kernel's slices, at places that the
-//! capacities determine. The memory holds no address, so it may be copied elsewhere as a whole.
+//! capacities determine. The memory holds no address, so it may be copied elsewhere as a whole, within one process and
+//! one build of the library: its layout is that build's own.
 
 use core::ffi::c_void;
 use core::marker::PhantomData;
@@ -111,6 +112,7 @@ impl Capacities {
         if self.frames > WINDOW_MAX || self.points > WINDOW_MAX {
             return None;
         }
+        u32::try_from(self.observations).ok()?;
         let after = |start: usize, each: usize, count: usize| {
             start.checked_add(each.checked_mul(count)?.checked_next_multiple_of(WORKSPACE_ALIGN)?)
         };

@@ -5,7 +5,7 @@ use core::marker::PhantomData;
 use epipole::Real;
 
 use crate::Status;
-use crate::raw::{Bytes, Input, Plain};
+use crate::raw::{Bytes, Plain, bytes_of};
 
 /// What every workspace and window is aligned to, bytes.
 pub const WORKSPACE_ALIGN: usize = 8;
@@ -42,8 +42,8 @@ impl<'a> Memory<'a> {
     /// A pointer that is not null points to `size` bytes, which nobody else uses for the lifetime.
     pub(crate) unsafe fn new(pointer: *mut core::ffi::c_void, size: usize) -> Result<Self, Status> {
         let start = pointer.cast::<u8>();
-        // SAFETY: passed on; bytes are read as such at the most.
-        let bytes = unsafe { Input::<u8>::new(start.cast_const(), size)? }.bytes();
+        // No reference yet: the caller need not have written to the memory.
+        let bytes = bytes_of(start.cast_const(), size)?;
         if !start.addr().is_multiple_of(WORKSPACE_ALIGN) {
             return Err(Status::Misaligned);
         }
@@ -68,11 +68,11 @@ impl<'a> Memory<'a> {
         let rounded = count.next_multiple_of(4);
         let numbers = self.start.cast::<T>();
         // SAFETY: `needed` bytes hold the three arrays one behind the other; the start is aligned to 8, and each array
-        // is a multiple of four elements, so the next is aligned. Numbers may have any bits; a mask must be written first.
+        // is a multiple of four elements, so the next is aligned. Zeros are values of all three.
         unsafe {
+            self.start.write_bytes(0, needed);
             let order = numbers.add(width * rounded).cast::<u32>();
             let inliers = order.add(rounded).cast::<bool>();
-            inliers.write_bytes(0, rounded);
             Ok(Slices {
                 numbers: core::slice::from_raw_parts_mut(numbers, width * rounded),
                 order: core::slice::from_raw_parts_mut(order, rounded),
