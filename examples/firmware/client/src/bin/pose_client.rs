@@ -102,7 +102,7 @@ fn start(image: &PathBuf) -> Result<(Machine, UnixStream), Box<dyn Error>> {
     let child = Command::new(runner)
         .arg(image)
         .env("QEMU_ARGS", format!("-serial unix:{}", path.display()))
-        .env("TIMEOUT", env::var("TIMEOUT").unwrap_or_else(|_| "180".into()))
+        .env("TIMEOUT", env::var("TIMEOUT").unwrap_or_else(|_| "1800".into()))
         .spawn()?;
     let mut machine = Machine { child, socket: path, line: None };
     let begun = Instant::now();
@@ -110,12 +110,12 @@ fn start(image: &PathBuf) -> Result<(Machine, UnixStream), Box<dyn Error>> {
         match listener.accept() {
             Ok((stream, _)) => {
                 stream.set_nonblocking(false)?;
-                stream.set_read_timeout(Some(Duration::from_secs(60)))?;
+                stream.set_read_timeout(Some(Duration::from_secs(300)))?;
                 machine.line = Some(stream.try_clone()?);
                 return Ok((machine, stream));
             }
             Err(_) if machine.child.try_wait()?.is_some() => return Err("the image did not start".into()),
-            Err(_) if begun.elapsed() > Duration::from_secs(20) => return Err("no emulator came".into()),
+            Err(_) if begun.elapsed() > Duration::from_secs(120) => return Err("no emulator came".into()),
             Err(_) => thread::sleep(Duration::from_millis(20)),
         }
     }
