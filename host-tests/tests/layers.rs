@@ -14,7 +14,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("geometry", &["real", "error", "solutions", "linalg"]),
     ("solvers", &["real", "error", "input", "solutions", "linalg", "geometry"]),
     ("robust", &["real", "error", "solutions", "linalg", "geometry"]),
-    ("refine", &["real", "error", "solutions", "linalg", "geometry", "robust::loss"]),
+    ("refine", &["real", "error", "input", "solutions", "linalg", "geometry", "robust::loss"]),
     ("bundle", &["real", "error", "solutions", "linalg", "geometry", "robust::loss"]),
     (
         "estimate",
