@@ -106,11 +106,13 @@ fn scaled<T: Real>(loss: &Loss<T>, factor: T) -> Loss<T> {
     }
 }
 
-/// Minimises a loss over a model, with the points filled into blocks a few at a time.
+/// Minimises a loss over a model, with the points filled into blocks a few at a time. With fewer than `least` in play the
+/// start stays.
 fn minimise<T: Real, M: Manifold<T, P>, const P: usize>(
     [x1, x2]: [&[Vector2<T>]; 2],
     frame: &Frame<T>,
     start: &M,
+    least: u32,
     options: &RefineTwoViewOptions<T>,
     equations: impl Fn(BlockSlice<'_, PlaneBlock<T>>, &M, &Loss<T>) -> NormalEquations<T, P>,
 ) -> RefinedTwoView<M, T> {
@@ -134,7 +136,7 @@ fn minimise<T: Real, M: Manifold<T, P>, const P: usize>(
     };
     let initial_cost = pass(start).cost;
     let passes = core::cmp::max(options.max_passes, 2) - 1;
-    let minimum: Minimum<M, T, P> = descend(start, P as u32, passes, T::EPSILON * lit(4.0), pass, M::retract);
+    let minimum: Minimum<M, T, P> = descend(start, least, passes, T::EPSILON * lit(4.0), pass, M::retract);
     let unit = frame.scale * frame.scale;
     RefinedTwoView {
         model: minimum.model,
@@ -204,7 +206,7 @@ pub fn relative_pose<T: Real>(
 ) -> Result<Option<RefinedTwoView<Pose<T>, T>>, InputError> {
     check(x1, x2, 5)?;
     let Some(model) = PoseModel::of(start) else { return Ok(None) };
-    let refined = minimise([x1, x2], &Frame::none(), &model, options, normal_equations::<T, _, _, 5>);
+    let refined = minimise([x1, x2], &Frame::none(), &model, 5, options, normal_equations::<T, _, _, 5>);
     Ok(Some(refined.map(|model| model.pose())))
 }
 
@@ -259,7 +261,7 @@ pub fn homography<T: Real>(
     let Some(model) = HomographyModel::new(&(frame.inward(1) * start.0 * frame.outward(0))) else {
         return Ok(None);
     };
-    let refined = minimise([x1, x2], &frame, &model, options, transfer_equations::<T, _, _, 8>);
+    let refined = minimise([x1, x2], &frame, &model, 4, options, transfer_equations::<T, _, _, 8>);
     Ok(unit(&(frame.outward(1) * refined.model.0 * frame.inward(0))).map(|h| refined.map(|_| Homography(h))))
 }
 
@@ -319,7 +321,7 @@ pub fn fundamental<T: Real>(
     let frame = Frame::about_means([x1, x2]);
     let framed = frame.outward(1).transpose() * start.0 * frame.outward(0);
     let Some(model) = unit(&framed).and_then(|f| FundamentalModel::new(&f)) else { return Ok(None) };
-    let refined = minimise([x1, x2], &frame, &model, options, normal_equations::<T, _, _, 7>);
+    let refined = minimise([x1, x2], &frame, &model, 7, options, normal_equations::<T, _, _, 7>);
     let f = frame.inward(1).transpose() * refined.model.matrix * frame.inward(0);
     Ok(unit(&f).map(|f| refined.map(|_| Fundamental(f))))
 }
