@@ -91,3 +91,44 @@ fn the_prior_keeps_estimate_and_covariance_f64() {
 fn the_prior_keeps_estimate_and_covariance_f32() {
     the_prior_keeps_estimate_and_covariance::<f32>(2e-2);
 }
+
+fn a_prior_of_relative_measurements_holds_nothing_in_the_world<T: Real>(tolerance: f64) {
+    for seed in 0..5 {
+        let mut memory = HeapWindow::<T>::new(6, 60, 200);
+        let mut window = memory.window();
+        let frames = fill(&mut window, seed, 0.5);
+        for frame in &frames {
+            window.fix_frame(*frame, false).unwrap();
+        }
+        let options = BundleOptions { loss: Loss::Squared, max_iterations: 0, ..BundleOptions::default() };
+        for frame in frames.iter().take(2) {
+            window.marginalise_frame(*frame, &Loss::Squared).unwrap();
+        }
+        let cost = window.optimise(&options).unwrap().cost_before.to_f64();
+        // The whole window carried somewhere else.
+        let mut rng = Rng::new(seed + 77);
+        let turn: UnitQuaternion<f64> = rng.rotation(0.8);
+        let carry = Pose::from_parts(Vector3::new(2.0, -3.0, 1.5).into(), turn);
+        for frame in frames.iter().skip(2) {
+            let pose: Pose<f64> = cast_pose(&window.pose(*frame).unwrap());
+            window.set_pose(*frame, &cast_pose(&(pose * carry.inverse()))).unwrap();
+        }
+        for point in window.point_handles().collect::<Vec<_>>() {
+            let x = window.position(point).unwrap().map(|x| x.to_f64());
+            let carried = carry.rotation * x + carry.translation.vector;
+            window.set_position(point, &carried.map(lit)).unwrap();
+        }
+        let carried = window.optimise(&options).unwrap().cost_before.to_f64();
+        assert!(cost > 1.0 && (carried / cost - 1.0).abs() < tolerance, "seed {seed}: {cost} {carried}");
+    }
+}
+
+#[test]
+fn a_prior_of_relative_measurements_holds_nothing_in_the_world_f64() {
+    a_prior_of_relative_measurements_holds_nothing_in_the_world::<f64>(1e-9);
+}
+
+#[test]
+fn a_prior_of_relative_measurements_holds_nothing_in_the_world_f32() {
+    a_prior_of_relative_measurements_holds_nothing_in_the_world::<f32>(1e-3);
+}

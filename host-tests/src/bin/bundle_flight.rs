@@ -4,13 +4,17 @@
 //!
 //! `bundle_flight long [FRAMES [SEED]]`: a long flight with a measured distance between neighbouring frames; prints
 //! the error and the normalised error squared (NEES over its 6 degrees of freedom, expected 1) along the way.
+//!
+//! `bundle_flight consistency [RUNS [FRAMES [FIRST]]]`: that many such flights, and the mean of their last frames' NEES,
+//! which are independent, with the bounds for it.
 
 use std::slice::from_ref;
 
 use epipole::Real;
-use epipole_host_tests::Rng;
 use epipole_host_tests::bundle::flight::{Flight, centre};
-use epipole_host_tests::bundle::odometer::{Leaving, Odometer};
+use epipole_host_tests::bundle::odometer::{
+    Leaving, Odometer, chi_square_bounds, last_normalised_error, measured_flight,
+};
 
 const TRACKS: usize = 60;
 
@@ -38,22 +42,12 @@ fn rms(rows: &[Vec<f64>]) -> f64 {
 }
 
 fn long<T: Real>(frames: usize, seed: u64) {
-    let sigma = 0.02;
-    let flight = Flight::new(frames, TRACKS, 1.0, seed);
-    let mut odometer = Odometer::<T>::new(8, 4 * TRACKS, Leaving::Oldest);
-    odometer.distance_sigma = Some(sigma);
-    let mut rng = Rng::new(seed + 1);
-    let (mut nees, mut count) = (0.0, 0);
     let mark = (frames / 10).max(1);
-    for k in 0..frames {
-        let step = if k > 0 { (flight.centre(k) - flight.centre(k - 1)).norm() } else { 1.0 };
-        odometer.step(&flight, Some(step + sigma * rng.normal()));
-        if k % 25 == 24 {
-            let told = odometer.normalised_error(&flight);
-            if k + 1 >= frames / 10 {
-                nees += told;
-                count += 1;
-            }
+    let (mut nees, mut count) = (0.0, 0);
+    measured_flight::<T>(frames, TRACKS, seed, |odometer, flight, k| {
+        if k % 25 == 24 && k + 1 >= frames / 10 {
+            nees += odometer.normalised_error(flight);
+            count += 1;
         }
         if (k + 1) % mark == 0 {
             let error = (centre(&odometer.poses[k]) - flight.centre(k)).norm();
@@ -63,7 +57,24 @@ fn long<T: Real>(frames: usize, seed: u64) {
                 nees / (6 * count.max(1)) as f64
             );
         }
-    }
+    });
+}
+
+/// Independent flights: of each the error of its last frame, normalised; the mean ought to lie between the 95 % bounds
+/// of the chi-square distribution.
+fn consistency<T: Real>(runs: usize, frames: usize, first: u64) {
+    let mut told: Vec<f64> =
+        (0..runs as u64).map(|run| last_normalised_error::<T>(frames, TRACKS, first + run)).collect();
+    let mean = told.iter().sum::<f64>() / (6 * runs) as f64;
+    let [low, high] = chi_square_bounds(6 * runs);
+    told.sort_by(f64::total_cmp);
+    let above = told.iter().filter(|&&e| e > 12.592).count();
+    println!(
+        "{runs} flights of {frames} frames: mean NEES / 6 {mean:.3}, 95 % bounds {low:.3} to {high:.3}; {:.1} % above the \
+         95 % quantile, worst {:.2}",
+        100.0 * above as f64 / runs as f64,
+        told[runs - 1] / 6.0
+    );
 }
 
 fn main() {
@@ -75,6 +86,15 @@ fn main() {
         long::<f64>(frames, seed);
         println!("f32");
         long::<f32>(frames, seed);
+        return;
+    }
+    if arguments.next_if(|a| a == "consistency").is_some() {
+        let mut number = |default: usize| arguments.next().and_then(|a| a.parse().ok()).unwrap_or(default);
+        let (runs, frames, first) = (number(100), number(300), number(0) as u64);
+        print!("f64: ");
+        consistency::<f64>(runs, frames, first);
+        print!("f32: ");
+        consistency::<f32>(runs, frames, first);
         return;
     }
     let mut number = |default: usize| arguments.next().and_then(|a| a.parse().ok()).unwrap_or(default);

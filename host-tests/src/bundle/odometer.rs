@@ -12,6 +12,7 @@ use epipole::robust::loss::Loss;
 use super::HeapWindow;
 use super::flight::{CAMERA, Flight, centre};
 use super::problem::cast_pose;
+use crate::Rng;
 
 /// What makes room for a new frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,18 +73,17 @@ impl<T: Real> Odometer<T> {
         self.frames.iter().map(|(k, f)| (*k, cast_pose(&window.pose(*f).expect("live")))).collect()
     }
 
-    /// The newest frame's error, squared and normalised by the covariance the window tells: six degrees of freedom.
+    /// The newest frame's error, squared and normalised by the covariance the window tells: six degrees of freedom. The
+    /// error is the twist that leads from the estimate to the truth: where the heading is uncertain, positions spread
+    /// along an arc, which is straight in a twist alone.
     pub fn normalised_error(&mut self, flight: &Flight) -> f64 {
         let k = self.poses.len() - 1;
         let (estimate, loss) = (self.poses[k], self.options.loss);
         let (mut window, newest) = self.window();
         let covariance = window.frame_covariance(newest, &loss).expect("an observable frame").motion;
-        let truth = &flight.poses[k];
-        // The motion from the estimate to the truth.
-        let turn = (truth.rotation * estimate.rotation.inverse()).scaled_axis();
-        let shift = estimate.rotation * (centre(&estimate) - flight.centre(k));
-        let e = Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z);
-        let information = covariance.map(|x| x.to_f64()).cholesky().expect("positive definite");
+        let e = twist(&(flight.poses[k] * estimate.inverse()));
+        let covariance = covariance.map(|x| x.to_f64());
+        let information = covariance.cholesky().expect("positive definite");
         e.dot(&information.solve(&e))
     }
 
@@ -189,4 +189,52 @@ fn midpoint(a: (Vector3<f64>, Vector3<f64>), b: (Vector3<f64>, Vector3<f64>)) ->
     let s = (d.dot(&a.1) - cos * d.dot(&b.1)) / sin_sq;
     let t = (cos * d.dot(&a.1) - d.dot(&b.1)) / sin_sq;
     (s > 0.5 && t > 0.5).then(|| (a.0 + a.1 * s + b.0 + b.1 * t) * 0.5)
+}
+
+/// The logarithm `(w, v)` of a pose.
+fn twist(pose: &Pose<f64>) -> Vector6<f64> {
+    let (w, t) = (pose.rotation.scaled_axis(), pose.translation.vector);
+    let angle = w.norm();
+    let bend = if angle < 1e-3 {
+        1.0 / 12.0
+    } else {
+        (1.0 - angle * angle.sin() / (2.0 * (1.0 - angle.cos()))) / (angle * angle)
+    };
+    let v = t - w.cross(&t) * 0.5 + w.cross(&w.cross(&t)) * bend;
+    Vector6::new(w.x, w.y, w.z, v.x, v.y, v.z)
+}
+
+/// Standard deviation of the distances that [`measured_flight`] measures between neighbouring frames.
+const DISTANCE_SIGMA: f64 = 0.02;
+
+/// Runs a window of 8 frames with measured distances over a flight with 1 px noise; `each` is called after every frame.
+pub fn measured_flight<T: Real>(
+    frames: usize,
+    tracks: usize,
+    seed: u64,
+    mut each: impl FnMut(&mut Odometer<T>, &Flight, usize),
+) -> (Odometer<T>, Flight) {
+    let flight = Flight::new(frames, tracks, 1.0, seed);
+    let mut odometer = Odometer::new(8, 4 * tracks, Leaving::Oldest);
+    odometer.distance_sigma = Some(DISTANCE_SIGMA);
+    let mut rng = Rng::new(seed + 1);
+    for k in 0..frames {
+        let step = if k > 0 { (flight.centre(k) - flight.centre(k - 1)).norm() } else { 1.0 };
+        odometer.step(&flight, Some(step + DISTANCE_SIGMA * rng.normal()));
+        each(&mut odometer, &flight, k);
+    }
+    (odometer, flight)
+}
+
+/// The normalised error squared of the last frame of a [`measured_flight`].
+pub fn last_normalised_error<T: Real>(frames: usize, tracks: usize, seed: u64) -> f64 {
+    let (mut odometer, flight) = measured_flight::<T>(frames, tracks, seed, |_, _, _| ());
+    odometer.normalised_error(&flight)
+}
+
+/// Between which a chi-square variable lies in 95 of 100 cases, over its degrees of freedom (E. Wilson, M. Hilferty,
+/// "The distribution of chi-square", PNAS 17(12), 1931).
+pub fn chi_square_bounds(degrees: usize) -> [f64; 2] {
+    let spread = 2.0 / (9.0 * degrees as f64);
+    [-1.959964, 1.959964].map(|z| (1.0 - spread + z * spread.sqrt()).powi(3))
 }

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 
 use super::memory::{Chart, FrameSlot, NO_SLOT, Work};
 use super::placement::Placement;
-use super::small::{M3, dot, mul, mul_transposed, sub};
+use super::small::{M3, V3, add, cross, dot, mul, mul_transposed, sub};
 use super::{WindowError, qr};
 use crate::Real;
 use crate::geometry::{Pose, pose};
@@ -206,42 +206,122 @@ fn prior_rows<T: Real>(
     at: At,
     sink: &mut impl FnMut(&[T], T),
 ) {
-    if prior_frames == 0 {
-        return;
-    }
+    let Some(anchor) = anchor(frames, prior_frames) else { return };
+    let (centre, base) = (anchor.at(at).centre, anchor.linearised);
+    let (column, slot, turn) = (anchor.prior_column, anchor.slot, anchor.at(at).turn_from(&base));
+    let (mut own, mut axes) = (Chart::IDENTITY, anchor.at(at).rotation);
     for frame in frames.iter_mut().filter(|f| f.prior_column != NO_SLOT) {
-        let here = *frame.at(at);
-        let e = here.motion_from(&frame.linearised);
-        let [turn, shift] = here.motion_jacobian(&frame.linearised, &e);
-        frame.work = Work::Chart(Chart { motion: e, turn, shift });
+        let (mut here, mut there) = (*frame.at(at), frame.linearised);
+        let is_anchor = frame.prior_column == column;
+        if !is_anchor {
+            // Both as seen from the anchor, in the axes of the world as the anchor has turned them.
+            here.centre = sub(&here.centre, &centre);
+            there.centre = sub(&there.centre, &base.centre);
+            there = there.turned(&turn);
+        }
+        let motion = here.motion_from(&there);
+        let [turn, shift] = here.motion_jacobian(&there, &motion);
+        let chart = Chart { motion, turn, shift };
+        if is_anchor {
+            (own, axes) = (chart, here.rotation);
+        }
+        frame.work = Work::Chart(chart);
     }
     let n = 6 * prior_frames;
+    let start = n - 6;
     for (k, packed) in qr::packed_rows(prior, n).enumerate() {
         let Some((&constant, packed)) = packed.split_last() else { continue };
         let mut residual = constant;
         row.fill(T::ZERO);
-        for frame in frames.iter().filter(|f| f.prior_column != NO_SLOT) {
-            let start = 6 * frame.prior_column as usize;
-            if start + 6 <= k {
-                continue;
-            }
-            let mut r = [T::ZERO; 6];
-            if start >= k {
-                for (x, &value) in r.iter_mut().zip(packed.iter().skip(start - k)) {
-                    *x = value;
-                }
-            } else {
-                for (x, &value) in r.iter_mut().skip(k - start).zip(packed.iter()) {
-                    *x = value;
-                }
-            }
+        let mut pull = Wrench::NONE;
+        for frame in frames.iter().filter(|f| f.prior_column != NO_SLOT && f.prior_column != column) {
+            let Some(r) = block_of(packed, k, 6 * frame.prior_column as usize) else { continue };
             let Work::Chart(chart) = &frame.work else { continue };
             for (a, b) in r.iter().zip(&chart.motion) {
                 residual += *a * *b;
             }
-            set_block(row, frame.slot, &through(&r, &chart.turn, &chart.shift));
+            let r = through(&r, &chart.turn, &chart.shift);
+            set_block(row, frame.slot, &r);
+            let here = frame.at(at);
+            pull.add(&r, &here.rotation, &sub(&centre, &here.centre));
         }
+        let Some(r) = block_of(packed, k, start) else { continue };
+        for (a, b) in r.iter().zip(&own.motion) {
+            residual += *a * *b;
+        }
+        let mut r = through(&r, &own.turn, &own.shift);
+        for (x, y) in r.iter_mut().zip(pull.on(&axes)) {
+            *x -= y;
+        }
+        set_block(row, slot, &r);
         sink(row, residual);
+    }
+}
+
+/// The frame of the prior's last column.
+fn anchor<T: Real>(frames: &[FrameSlot<T>], prior_frames: usize) -> Option<&FrameSlot<T>> {
+    let last = prior_frames.checked_sub(1)?;
+    frames.iter().find(|f| f.prior_column != NO_SLOT && f.prior_column as usize == last)
+}
+
+/// Rewrites a factor over the motions of all frames, linearised where they are, for the prior's chart: the motion of
+/// the anchor, and those of the others beside it.
+pub(super) fn tie_to_anchor<T: Real>(frames: &[FrameSlot<T>], prior: &mut [T], prior_frames: usize) {
+    let Some(anchor) = anchor(frames, prior_frames) else { return };
+    let n = 6 * prior_frames;
+    for (k, packed) in qr::packed_rows_mut(prior, n).enumerate() {
+        let Some((_, packed)) = packed.split_last_mut() else { continue };
+        let mut pull = Wrench::NONE;
+        for frame in
+            frames.iter().filter(|f| f.prior_column != NO_SLOT && f.prior_column != anchor.prior_column)
+        {
+            if let Some(r) = block_of(packed, k, 6 * frame.prior_column as usize) {
+                pull.add(&r, &frame.pose.rotation, &sub(&anchor.pose.centre, &frame.pose.centre));
+            }
+        }
+        // In the anchor's own rows the others have nothing.
+        for (x, y) in packed.iter_mut().rev().zip(pull.on(&anchor.pose.rotation).iter().rev()) {
+            *x += *y;
+        }
+    }
+}
+
+/// The six elements from column `start` on of row `k` of a packed triangle; none where all are left of it.
+fn block_of<T: Real>(packed: &[T], k: usize, start: usize) -> Option<[T; 6]> {
+    if start + 6 <= k {
+        return None;
+    }
+    let mut r = [T::ZERO; 6];
+    for (x, &value) in
+        r.iter_mut().skip(k.saturating_sub(start)).zip(packed.iter().skip(start.saturating_sub(k)))
+    {
+        *x = value;
+    }
+    Some(r)
+}
+
+/// What rows by the motions of several frames say of a motion that carries all of them along with the anchor: as forces
+/// on a rigid body, in the axes of the world, with their moment about the anchor's centre.
+struct Wrench<T> {
+    moment: V3<T>,
+    force: V3<T>,
+}
+
+impl<T: Real> Wrench<T> {
+    const NONE: Self = Self { moment: [T::ZERO; 3], force: [T::ZERO; 3] };
+
+    /// Adds the row `r` of a frame with these axes; `arm` leads from its centre to the anchor's.
+    fn add(&mut self, r: &[T; 6], axes: &M3<T>, arm: &V3<T>) {
+        let force = mul_transposed(axes, &[r[3], r[4], r[5]]);
+        let moment = add(&mul_transposed(axes, &[r[0], r[1], r[2]]), &cross(&force, arm));
+        self.moment = add(&self.moment, &moment);
+        self.force = add(&self.force, &force);
+    }
+
+    /// The row by the motion of the anchor.
+    fn on(&self, axes: &M3<T>) -> [T; 6] {
+        let ([a, b, c], [d, e, f]) = (mul(axes, &self.moment), mul(axes, &self.force));
+        [a, b, c, d, e, f]
     }
 }
 
@@ -267,4 +347,87 @@ pub(super) fn to_pose_chart<T: Real>(covariance: &Matrix6<T>, pose: &Pose<T>) ->
     let minus: Matrix3<T> = -pose::skew(&pose.translation.vector);
     chart.fixed_view_mut::<3, 3>(3, 0).copy_from(&minus);
     chart * covariance * chart.transpose()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bundle::prior_len;
+
+    const FRAMES: usize = 3;
+
+    fn some(k: f64) -> Placement<f64> {
+        let d = [0.3 * k, -0.2, 0.1 + 0.05 * k * k, k, 0.2 * k * k, -0.1 * k];
+        Placement::IDENTITY.moved(&d)
+    }
+
+    /// Three frames of a prior, away from where it is linearised; the anchor is not the last slot.
+    fn scene() -> ([FrameSlot<f64>; FRAMES], [f64; prior_len(FRAMES)]) {
+        let mut frames = [FrameSlot::EMPTY; FRAMES];
+        for ((k, frame), column) in (0u16..).zip(frames.iter_mut()).zip([1, 2, 0]) {
+            frame.linearised = some(f64::from(k));
+            let d = [0.05, -0.02 * f64::from(k), 0.03, 0.2, 0.1 * f64::from(k), -0.3];
+            frame.pose = frame.linearised.moved(&d);
+            frame.slot = k;
+            frame.prior_column = column;
+        }
+        let mut seed = 1.0;
+        let prior = [(); prior_len(FRAMES)].map(|()| {
+            seed = (seed * 7.13 + 0.31) % 1.9;
+            seed - 0.9
+        });
+        (frames, prior)
+    }
+
+    fn residuals(frames: &mut [FrameSlot<f64>], prior: &[f64]) -> ([f64; 18], [[f64; 18]; 18]) {
+        let (mut all, mut jacobian, mut k) = ([0.0; 18], [[0.0; 18]; 18], 0);
+        prior_rows(frames, prior, FRAMES, &mut [0.0; 18], At::Current, &mut |j: &[f64], r| {
+            (all[k], jacobian[k]) = (r, j.try_into().unwrap());
+            k += 1;
+        });
+        assert_eq!(k, 18);
+        (all, jacobian)
+    }
+
+    #[test]
+    fn prior_jacobian_by_central_differences() {
+        let (frames, prior) = scene();
+        let jacobian = residuals(&mut frames.clone(), &prior).1;
+        for column in 0..18 {
+            let h = 1e-6;
+            let at = |h: f64| {
+                let mut frames = frames;
+                let mut d = [0.0; 6];
+                d[column % 6] = h;
+                frames[column / 6].pose = frames[column / 6].pose.moved(&d);
+                residuals(&mut frames, &prior).0
+            };
+            let (up, down) = (at(h), at(-h));
+            for row in 0..18 {
+                let slope = (up[row] - down[row]) / (2.0 * h);
+                assert!((slope - jacobian[row][column]).abs() < 1e-7, "{row} {column}");
+            }
+        }
+    }
+
+    #[test]
+    fn tied_to_the_anchor_is_the_same_where_it_is_linearised() {
+        let (mut frames, mut prior) = scene();
+        for frame in &mut frames {
+            frame.linearised = frame.pose;
+        }
+        let untied = prior;
+        tie_to_anchor(&frames, &mut prior, FRAMES);
+        let (r, jacobian) = residuals(&mut frames, &prior);
+        for (row, packed) in qr::packed_rows(&untied, 18).enumerate() {
+            let (constant, packed) = packed.split_last().unwrap();
+            assert!((r[row] - constant).abs() < 1e-14);
+            for (frame, start) in [(0usize, 6usize), (1, 12), (2, 0)] {
+                for i in 0..6 {
+                    let want = (start + i).checked_sub(row).map_or(0.0, |k: usize| packed[k]);
+                    assert!((want - jacobian[row][6 * frame + i]).abs() < 1e-13, "{row} {frame} {i}");
+                }
+            }
+        }
+    }
 }

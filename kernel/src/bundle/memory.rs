@@ -104,6 +104,14 @@ pub(super) struct Chart<T> {
     pub(super) shift: M3<T>,
 }
 
+impl<T: Real> Chart<T> {
+    pub(super) const IDENTITY: Self = Self {
+        motion: [T::ZERO; 6],
+        turn: Placement::IDENTITY.rotation,
+        shift: Placement::IDENTITY.rotation,
+    };
+}
+
 /// A known distance to another frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Distance<T> {

@@ -19,7 +19,7 @@
 //! products. The second pass, after the system is solved, computes the same Jacobians again, moves the point and compares
 //! the costs: nothing is stored for an observation but what was measured. The change of the cost is summed point by
 //! point, which keeps it meaningful in `f32` where the two costs no longer differ. While the cost falls by less than a
-//! fifth, iterations keep the factored system and renew its right-hand side.
+//! tenth, iterations keep the factored system and renew its right-hand side.
 //!
 //! A frame moves by a rotation about its own camera centre and a translation in its own axes: the world's origin may
 //! be far away.

@@ -93,6 +93,33 @@ impl<T: Real> Placement<T> {
         [a, b, c, v[0], v[1], v[2]]
     }
 
+    /// The turn of the world's axes, as a quaternion, that takes the rotation of `base` to this one when the world is
+    /// turned instead of the camera.
+    pub(super) fn turn_from(&self, base: &Self) -> [T; 4] {
+        let ([w, x, y, z], [bw, bx, by, bz]) = (self.quaternion, base.quaternion);
+        // (conjugate of base) q
+        [
+            bw * w + bx * x + by * y + bz * z,
+            bw * x - bx * w - by * z + bz * y,
+            bw * y - by * w - bz * x + bx * z,
+            bw * z - bz * w - bx * y + by * x,
+        ]
+    }
+
+    /// Where this placement is after a turn of the world's axes about the origin.
+    pub(super) fn turned(&self, turn: &[T; 4]) -> Self {
+        let [w, x, y, z] = self.quaternion;
+        let [a, b, c, d] = *turn;
+        let q = [
+            w * a - x * b - y * c - z * d,
+            w * b + x * a + y * d - z * c,
+            w * c + y * a + z * b - x * d,
+            w * d + z * a + x * c - y * b,
+        ];
+        let axes = Self::new(*turn, [T::ZERO; 3]).rotation;
+        Self::new(q, mul_transposed(&axes, &self.centre))
+    }
+
     /// The Jacobian of [`motion_from`](Self::motion_from) `= e` by a further motion of this placement: the two diagonal
     /// blocks, rotation and translation.
     pub(super) fn motion_jacobian(&self, base: &Self, e: &[T; 6]) -> [M3<T>; 2] {

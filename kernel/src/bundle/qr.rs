@@ -22,6 +22,16 @@ pub(super) fn packed_rows<T>(factor: &[T], n: usize) -> impl Iterator<Item = &[T
     })
 }
 
+/// The rows of a packed factor, to write to.
+pub(super) fn packed_rows_mut<T>(factor: &mut [T], n: usize) -> impl Iterator<Item = &mut [T]> {
+    let mut rest = factor;
+    (0..n).map_while(move |k| {
+        let (row, tail) = core::mem::take(&mut rest).split_at_mut_checked(n - k + 1)?;
+        rest = tail;
+        Some(row)
+    })
+}
+
 /// Folds one row (`n` columns and the right-hand side, from column `first` on) into a packed factor. `row` is used up;
 /// what is left of it has zeros in all columns.
 ///
