@@ -50,15 +50,16 @@ impl<T: Real> Window<'_, T> {
     ///
     /// # Cost
     /// At most [`BundleOptions::max_iterations`] iterations, each two linearisations and one projection of every
-    /// observation. While the cost still falls by more than a fifth, an iteration also adds up a 6x6 block for every pair
+    /// observation. While the cost still falls by more than a tenth, an iteration also adds up a 6x6 block for every pair
     /// of frames that see a point together and factors the system, half of all work; afterwards up to four of five
-    /// iterations keep the factor they have, with a new gradient, which loses next to nothing.
+    /// iterations keep the factor they have, with a new gradient and the curvature that the last step met.
     ///
     /// # References
     /// B. Triggs, P. McLauchlan, R. Hartley, A. Fitzgibbon, "Bundle adjustment: a modern synthesis", Vision Algorithms,
     /// 2000 (the elimination; the second-order weight of a robust loss, section 4.3). H. B. Nielsen, "Damping parameter
     /// in Marquardt's method", 1999 (the rule of the damping). J. Fan, "A Shamanskii-like Levenberg-Marquardt method for
-    /// nonlinear equations", Computational Optimization and Applications 56, 2013 (steps that keep a factor). Deviation:
+    /// nonlinear equations", Computational Optimization and Applications 56, 2013 (steps that keep a factor). J. Nocedal,
+    /// "Updating quasi-Newton matrices with limited storage", Mathematics of Computation 35, 1980 (the curvature). Deviation:
     /// Marquardt's diagonal for the frames is that of the reduced system.
     ///
     /// # Examples
@@ -327,7 +328,7 @@ impl<T: Real> Window<'_, T> {
 /// A fall by less than this share of the cost turns the curvature of the loss on.
 const CURVED: f64 = 1e-3;
 /// A fall by less than this share of the cost lets the next iteration keep the factored system.
-const LAGGED: f64 = 0.2;
+const LAGGED: f64 = 0.1;
 /// Iterations in a row that may keep it.
 const OLDEST: u32 = 4;
 /// The squared residual, in variances of its noise, that is as good as none: a thirtieth of a standard deviation.
@@ -432,6 +433,7 @@ impl<T: Real> Problem<'_, T> {
 
     /// Goes to where the last step led.
     fn accept(&mut self) {
+        self.system.remember();
         for frame in self.frames.iter_mut().filter(|f| f.slot != NO_SLOT) {
             frame.pose = frame.trial;
         }

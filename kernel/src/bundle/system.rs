@@ -15,6 +15,9 @@ pub(super) struct System<'a, T> {
     pub(super) rhs: &'a mut [[T; 6]],
     /// The step; a row of the constraints while there is no step.
     pub(super) step: &'a mut [[T; 6]],
+    /// The step before, and the right-hand side it was taken from.
+    last_step: &'a mut [[T; 6]],
+    last_rhs: &'a mut [[T; 6]],
     /// What lies behind: the marginalisation prior.
     pub(super) prior: &'a [T],
     /// The blocks are the factor of an earlier iteration, and stay: only the right-hand side is filled.
@@ -36,8 +39,10 @@ impl<'a, T: Real> System<'a, T> {
         let (blocks, _) = blocks.split_at_mut_checked(block_index(used, 0))?;
         let vectors = vectors.as_chunks_mut::<6>().0;
         let (rhs, vectors) = vectors.split_at_mut_checked(used)?;
-        let (step, _) = vectors.split_at_mut_checked(used)?;
-        Some(Self { blocks, rhs, step, prior, lagged: false })
+        let (step, vectors) = vectors.split_at_mut_checked(used)?;
+        let (last_step, vectors) = vectors.split_at_mut_checked(used)?;
+        let (last_rhs, _) = vectors.split_at_mut_checked(used)?;
+        Some(Self { blocks, rhs, step, last_step, last_rhs, prior, lagged: false })
     }
 
     pub(super) fn clear(&mut self) {
@@ -108,27 +113,68 @@ impl<'a, T: Real> System<'a, T> {
         true
     }
 
-    /// The step, of the factored system.
+    /// Keeps the step and what it was taken from, for a lagged system to learn from.
+    pub(super) fn remember(&mut self) {
+        for (to, from) in self.last_step.iter_mut().zip(self.step.iter()) {
+            *to = *from;
+        }
+        for (to, from) in self.last_rhs.iter_mut().zip(self.rhs.iter()) {
+            *to = *from;
+        }
+    }
+
+    /// The step, of the factored system; of a lagged one with the curvature that the last step met (one pair of
+    /// BFGS).
     pub(super) fn solve(&mut self) {
-        let Self { blocks, rhs, step, .. } = self;
-        for a in 0..rhs.len() {
+        for (to, from) in self.step.iter_mut().zip(self.rhs.iter()) {
+            *to = *from;
+        }
+        if !self.lagged {
+            self.apply_inverse();
+            return;
+        }
+        for (y, b) in self.last_rhs.iter_mut().zip(self.rhs.iter()) {
+            for k in 0..6 {
+                y[k] -= b[k];
+            }
+        }
+        let met = product(self.last_step, self.last_rhs);
+        if !(met > T::ZERO) {
+            self.apply_inverse();
+            return;
+        }
+        let along = product(self.last_step, self.step) / met;
+        for (x, y) in self.step.iter_mut().zip(self.last_rhs.iter()) {
+            for k in 0..6 {
+                x[k] -= along * y[k];
+            }
+        }
+        self.apply_inverse();
+        let along = along - product(self.last_rhs, self.step) / met;
+        for (x, s) in self.step.iter_mut().zip(self.last_step.iter()) {
+            for k in 0..6 {
+                x[k] += along * s[k];
+            }
+        }
+    }
+
+    /// Solves the factored system for the right-hand side in `step`.
+    fn apply_inverse(&mut self) {
+        let Self { blocks, step, .. } = self;
+        for a in 0..step.len() {
             let Some(row) = blocks.get(block_index(a, 0)..=block_index(a, a)) else { return };
             let Some((done, rest)) = step.split_at_mut_checked(a) else { return };
-            let (Some(x), Some(b), Some((diagonal, row))) = (rest.first_mut(), rhs.get(a), row.split_last())
-            else {
-                return;
-            };
-            let mut sum = *b;
+            let (Some(x), Some((diagonal, row))) = (rest.first_mut(), row.split_last()) else { return };
             for (l, y) in row.iter().zip(done.iter()) {
                 for i in 0..6 {
                     for j in 0..6 {
-                        sum[i] -= l[i][j] * y[j];
+                        x[i] -= l[i][j] * y[j];
                     }
                 }
             }
-            *x = forward(diagonal, &sum);
+            *x = forward(diagonal, x);
         }
-        for a in (0..rhs.len()).rev() {
+        for a in (0..step.len()).rev() {
             let Some(row) = blocks.get(block_index(a, 0)..=block_index(a, a)) else { return };
             let Some((before, rest)) = step.split_at_mut_checked(a) else { return };
             let (Some(x), Some((diagonal, row))) = (rest.first_mut(), row.split_last()) else { return };
@@ -142,6 +188,16 @@ impl<'a, T: Real> System<'a, T> {
             }
         }
     }
+}
+
+fn product<T: Real>(a: &[[T; 6]], b: &[[T; 6]]) -> T {
+    let mut sum = T::ZERO;
+    for (a, b) in a.iter().zip(b) {
+        for k in 0..6 {
+            sum += a[k] * b[k];
+        }
+    }
+    sum
 }
 
 /// `t -= p q'`
