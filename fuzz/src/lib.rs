@@ -1,4 +1,4 @@
-//! Arbitrary bytes through the public functions of `epipole`, one group a target: nothing panics, and what is promised
+//! Arbitrary bytes through the public functions of `epipole`, one group a target, and through the firmware's wire format: nothing panics, and what is promised
 //! finite is finite whatever the input's bits.
 //!
 //! Long runs, from the project's root (`cargo install cargo-fuzz`; `--sanitizer none` also runs on a stable compiler,
@@ -9,6 +9,7 @@
 //! ```
 
 pub mod capi;
+pub mod wire;
 
 use epipole_exercise::{CAPABILITIES, Sink, Source};
 
