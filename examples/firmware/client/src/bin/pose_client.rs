@@ -6,11 +6,12 @@
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::io::{Read, Write};
-use std::os::unix::net::{UnixListener, UnixStream};
-use std::path::PathBuf;
+use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitCode};
 use std::time::{Duration, Instant};
-use std::{env, fs, thread};
+use std::{env, thread};
 
 use epipole_client::answers::{CAPACITY, Library};
 use epipole_client::damage::{Damage, Outcome, below, by_hand, reference, send};
@@ -72,49 +73,42 @@ fn main() -> ExitCode {
 }
 
 /// The emulator behind its runner; it ends with us.
-struct Machine {
-    child: Child,
-    socket: PathBuf,
-    line: Option<UnixStream>,
-}
+struct Machine(Child);
 
 impl Drop for Machine {
     fn drop(&mut self) {
-        let _ = fs::remove_file(&self.socket);
-        // To kill the runner would leave the emulator behind: the image is asked to end, and drained meanwhile.
-        if let Some(line) = &mut self.line
-            && matches!(self.child.try_wait(), Ok(None))
-        {
-            let _ = line.set_write_timeout(Some(Duration::from_secs(5)));
-            let _ = line.write_all(&[&[0][..], &by_hand(VERSION, kind::RESTART, 0, &[])].concat());
-            let _ = line.set_read_timeout(Some(Duration::from_secs(5)));
-            while matches!(line.read(&mut [0; 4096]), Ok(1..)) {}
+        if matches!(self.0.try_wait(), Ok(None)) {
+            // The runner and all that it started, for none outlives it then.
+            let group = format!("kill -s TERM -- -{}", self.0.id());
+            let _ = Command::new("sh").args(["-c", &group]).status();
         }
+        let _ = self.0.wait();
     }
 }
 
-fn start(image: &PathBuf) -> Result<(Machine, UnixStream), Box<dyn Error>> {
+fn start(image: &Path) -> Result<(Machine, TcpStream), Box<dyn Error>> {
     let runner = env::var_os("RUNNER")
         .map_or_else(|| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../runner")), PathBuf::from);
-    let path = env::temp_dir().join(format!("epipole-{}.socket", std::process::id()));
-    let listener = UnixListener::bind(&path)?;
+    // A free port of this machine alone: no file, whose path could be too long or be left behind.
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
     listener.set_nonblocking(true)?;
     let child = Command::new(runner)
         .arg(image)
-        .env("QEMU_ARGS", format!("-serial unix:{}", path.display()))
+        .env("QEMU_ARGS", format!("-serial tcp:{}", listener.local_addr()?))
         .env("TIMEOUT", env::var("TIMEOUT").unwrap_or_else(|_| "1800".into()))
+        .process_group(0)
         .spawn()?;
-    let mut machine = Machine { child, socket: path, line: None };
+    let mut machine = Machine(child);
     let begun = Instant::now();
     loop {
         match listener.accept() {
             Ok((stream, _)) => {
                 stream.set_nonblocking(false)?;
+                stream.set_nodelay(true)?;
                 stream.set_read_timeout(Some(Duration::from_secs(300)))?;
-                machine.line = Some(stream.try_clone()?);
                 return Ok((machine, stream));
             }
-            Err(_) if machine.child.try_wait()?.is_some() => return Err("the image did not start".into()),
+            Err(_) if machine.0.try_wait()?.is_some() => return Err("the image did not start".into()),
             Err(_) if begun.elapsed() > Duration::from_secs(120) => return Err("no emulator came".into()),
             Err(_) => thread::sleep(Duration::from_millis(20)),
         }
@@ -123,7 +117,7 @@ fn start(image: &PathBuf) -> Result<(Machine, UnixStream), Box<dyn Error>> {
 
 /// Calls `each` with every frame that comes, until it has enough.
 fn receive(
-    stream: &mut UnixStream,
+    stream: &mut TcpStream,
     mut each: impl FnMut(&Frame<'_>, &[u8]) -> Result<bool, Box<dyn Error>>,
 ) -> Result<(), Box<dyn Error>> {
     let mut buffer = vec![0; encoded_len(reply_bytes(CAPACITY))];
@@ -148,7 +142,7 @@ fn receive(
     }
 }
 
-fn ask(stream: &mut UnixStream, kind: u8, sequence: u16) -> Result<Statistics, Box<dyn Error>> {
+fn ask(stream: &mut TcpStream, kind: u8, sequence: u16) -> Result<Statistics, Box<dyn Error>> {
     stream.write_all(&by_hand(VERSION, kind, sequence, &[]))?;
     let mut told = None;
     receive(stream, |frame, _| match Reply::parse(frame) {
@@ -274,7 +268,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 
     let last = next();
     let after = ask(&mut stream, kind::RESTART, last)?;
-    let code = machine.child.wait()?;
+    let code = machine.0.wait()?;
     println!(
         "{:44} {:>6} {:>8} {:>8} {:>11} {:>11}",
         "answered", "frames", "matches", "inliers", "mean us", "longest us"
