@@ -36,6 +36,7 @@ entries! {
     relpose_5pt_poses(a: &[V3; 5], b: &[V3; 5]) -> Solutions<P, 10> = s::relpose_5pt_poses(a, b);
     relpose_7pt(a: &[V3; 7], b: &[V3; 7]) -> Solutions<epipole::geometry::Fundamental<f32>, 3> = s::relpose_7pt(a, b);
     relpose_8pt(a: &[V3], b: &[V3]) -> Option<Essential<f32>> = s::relpose_8pt(a, b).ok().flatten();
+    relpose_8pt_to_pose(a: &[V3], b: &[V3]) -> Option<CheiralPose<f32>> = s::relpose_8pt(a, b).ok().flatten().and_then(|e| e.pose_by_cheirality(a, b));
     relpose_upright_3pt(a: &[V3; 3], b: &[V3; 3]) -> Solutions<P, 4> = s::relpose_upright_3pt(a, b);
     homography_4pt(a: &[V3; 4], b: &[V3; 4]) -> Option<Homography<f32>> = s::homography_4pt(a, b);
     homography_npt(a: &[V3], b: &[V3]) -> Option<Homography<f32>> = s::homography_npt(a, b).ok().flatten();

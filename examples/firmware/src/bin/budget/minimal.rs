@@ -9,15 +9,12 @@ use epipole::nalgebra::{Matrix3, Vector2, Vector3};
 use epipole::solvers as s;
 use epipole_problems::{Geometry, TwoView};
 
-use crate::row::{Trial, row, trial};
+use crate::row::{PROBLEMS, Trial, row, trial};
 
 type Scene = TwoView<8>;
 
 /// Rotation error, rad, or distance of matrices, below which a problem counts as solved.
 const SOLVED: f64 = 1e-3;
-
-/// Built with QUICK=1 the image leaves out most problems: enough for the mean and the stack, not for the worst.
-const QUICK: bool = option_env!("QUICK").is_some();
 
 fn best<const N: usize>(scene: &Scene, poses: &Solutions<Pose<f32>, N>) -> f64 {
     poses.iter().map(|p| scene.rotation_error(&p.rotation)).fold(f64::INFINITY, f64::min)
@@ -34,11 +31,11 @@ fn rows(name: &str, geometry: Geometry, run: impl Fn(&Scene) -> Trial) {
         row(name, "0..32", 0..32, SOLVED, |k| run(&Scene::new(geometry, k)));
         return;
     }
-    row(name, "0..256", 0..256, SOLVED, |k| run(&Scene::new(geometry, k)));
-    if !QUICK {
-        row(name, "256..4096", 256..4096, SOLVED, |k| run(&Scene::new(geometry, k)));
+    row(name, "0..256", 0..PROBLEMS.min(256), SOLVED, |k| run(&Scene::new(geometry, k)));
+    if PROBLEMS > 256 {
+        row(name, "256..4096", 256..PROBLEMS, SOLVED, |k| run(&Scene::new(geometry, k)));
     }
-    row(name, "hostile", 0..if QUICK { 64 } else { 512 }, SOLVED, |k| {
+    row(name, "hostile", 0..(PROBLEMS / 4).min(512), SOLVED, |k| {
         let mut scene = Scene::new(geometry, k);
         let other = Scene::new(geometry, k + 1);
         scene.x2 = other.x2;

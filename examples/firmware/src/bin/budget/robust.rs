@@ -3,17 +3,18 @@
 use core::hint::black_box;
 
 use epipole::estimate::{
-    AbsolutePoseOptions, AbsolutePoseStorage, FundamentalOptions, GravityPrior, HomographyOptions,
-    RelativePoseOptions, RelativePosePrior, RelativePoseStorage, absolute_pose, fundamental, homography,
-    relative_pose,
+    AbsolutePoseOptions, AbsolutePoseStorage, FundamentalOptions, FundamentalStorage, GravityPrior,
+    HomographyOptions, HomographyStorage, RelativePoseOptions, RelativePosePrior, RelativePoseStorage,
+    absolute_pose, fundamental, homography, relative_pose,
 };
-use epipole::geometry::{Pinhole, Pose};
+use epipole::geometry::triangulation::ViewPair;
+use epipole::geometry::{CameraModel, Pinhole, Pose};
 use epipole::nalgebra::{Matrix3, Vector3, Vector6};
 use epipole::refine::{self, RefineAbsolutePoseOptions};
 use epipole_problems::two_view::FOCAL;
 use epipole_problems::{Geometry, TwoView};
 
-use crate::row::{Trial, row, trial};
+use crate::row::{PROBLEMS, Trial, row, trial, workspace};
 
 const N: usize = if cfg!(small_ram) { 24 } else { 100 };
 /// Rotation error, rad, below which a problem counts as solved.
@@ -22,10 +23,10 @@ const SOLVED: f64 = 1e-2;
 type Scene = TwoView<N>;
 
 fn rows(name: &str, geometry: Geometry, mut run: impl FnMut(&Scene) -> Trial) {
-    let count = if cfg!(small_ram) { 4 } else { 32 };
+    let count = if cfg!(small_ram) { 4 } else { (PROBLEMS / 8).min(32) };
     row(name, "ransac", 0..count, SOLVED, |k| run(&scene(geometry, k)));
     if !cfg!(small_ram) {
-        row(name, "all wrong", 0..4, SOLVED, |k| {
+        row(name, "all wrong", 0..(PROBLEMS / 64).min(4), SOLVED, |k| {
             let mut wrong = scene(geometry, k);
             wrong.x2 = scene(geometry, k + 77).x2;
             run(&wrong)
@@ -46,6 +47,10 @@ fn rotation_error(scene: &Scene, pose: Option<Pose<f32>>) -> f64 {
 pub fn run() {
     let focal = FOCAL as f32;
     let Ok(camera) = Pinhole::new(focal, focal, 0.0, 0.0) else { return };
+    workspace::<RelativePoseStorage<f32, 200>>("estimate_relative_pose");
+    workspace::<AbsolutePoseStorage<f32, 200>>("estimate_absolute_pose");
+    workspace::<HomographyStorage<f32, 200>>("estimate_homography");
+    workspace::<FundamentalStorage<f32, 200>>("estimate_fundamental");
     let mut storage = RelativePoseStorage::<f32, N>::new();
     let mut workspace = storage.workspace();
     let mut options = RelativePoseOptions::<f32>::default();
@@ -65,6 +70,28 @@ pub fn run() {
             )
         });
     }
+    let mut points = [None; N];
+    rows("estimate_relative_pose and points", Geometry::Ransac, |scene| {
+        let [x1, x2] = scene.pixels();
+        trial(
+            || {
+                let (x1, x2) = (black_box(&x1), black_box(&x2));
+                let estimate = relative_pose(&camera, &camera, x1, x2, &options, &mut workspace).ok()?;
+                let pair = ViewPair::new(&estimate.pose()?);
+                for (point, ((a, b), &inlier)) in
+                    points.iter_mut().zip(x1.iter().zip(x2).zip(workspace.inliers()))
+                {
+                    *point = None;
+                    if inlier && let (Ok(a), Ok(b)) = (camera.unproject(a), camera.unproject(b)) {
+                        *point = pair.triangulate_midpoint(&a, &b).point();
+                    }
+                }
+                Some(estimate)
+            },
+            |estimate| rotation_error(scene, estimate.as_ref().and_then(|e| e.pose())),
+        )
+    });
+    black_box(&points);
     let mut options = AbsolutePoseOptions::<f32>::default();
     options.max_error_px = 2.0;
     options.ransac.confidence = 0.99;

@@ -5,6 +5,14 @@ use core::ops::Range;
 
 use epipole_firmware::{count, println, stack};
 
+/// Problems of a set at the most, as the image was built: 256 suffice for the mean and the stack, all are for the worst.
+pub const PROBLEMS: u32 = match option_env!("PROBLEMS") {
+    Some(number) => match u32::from_str_radix(number, 10) {
+        Ok(number) => number,
+        Err(_) => panic!("PROBLEMS is no number"),
+    },
+    None => 4096,
+};
 /// Problems of one line at the most.
 const MOST: usize = if cfg!(target_arch = "arm") && cfg!(small_ram) { 256 } else { 4096 };
 /// Bytes of stack looked at.
@@ -22,6 +30,11 @@ pub struct Trial {
     error: f64,
     cost: u64,
     stack: usize,
+}
+
+/// Prints the memory that an entry point is lent, as the type that holds it.
+pub fn workspace<S>(name: &str) {
+    println!("workspace | {name} | {}", size_of::<S>());
 }
 
 /// Calls and counts, and calls again to look at the stack, without interrupts; `error` judges the answer.
