@@ -5,7 +5,7 @@
 //! and the kernel holds no unsafe code for the address sanitizer to watch):
 //!
 //! ```text
-//! cargo fuzz run --sanitizer none solvers -- -max_total_time=600 -max_len=2048
+//! cargo fuzz run --features libfuzzer --sanitizer none solvers -- -max_total_time=600 -max_len=2048
 //! ```
 
 pub mod capi;
