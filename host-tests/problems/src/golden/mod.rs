@@ -71,8 +71,9 @@ impl Answer {
     }
 }
 
-/// Asks every capability, in `f32` and, if `wide`, in `f64`.
-pub fn run(wide: bool, answered: &mut dyn FnMut(Answer)) {
+/// Asks every capability, in `f32` and, if `wide`, in `f64`. Generic, so that all of the kernel in both scalars is compiled
+/// into the programs that call this, and not into every one that uses this crate.
+pub fn run(wide: bool, answered: &mut impl FnMut(Answer)) {
     for problem in PROBLEMS {
         for (scalar, call) in [("f32", problem.f32), ("f64", problem.f64)] {
             if scalar == "f64" && !wide {
@@ -86,7 +87,7 @@ pub fn run(wide: bool, answered: &mut dyn FnMut(Answer)) {
 }
 
 /// Asks every capability on arguments of any bits, in both scalars.
-pub fn run_any_bits(answered: &mut dyn FnMut(Answer)) {
+pub fn run_any_bits(answered: &mut impl FnMut(Answer)) {
     for capability in CAPABILITIES {
         for (scalar, call) in [("f32", capability.f32), ("f64", capability.f64)] {
             let mut sink = Sink::default();
