@@ -3,6 +3,9 @@
 //! A capability is asked twice: on problems that have a solution (`problem ...`), and on arguments of any bits
 //! (`any bits ...`). The committed hashes are the host's; every target must find the same.
 
+use core::marker::PhantomData;
+
+use epipole::Real;
 use epipole_exercise::{CAPABILITIES, Sink, Source};
 
 mod estimate;
@@ -19,30 +22,35 @@ pub const VERSIONS: &str = concat!("nalgebra ", env!("NALGEBRA_VERSION"), ", lib
 /// How many random arguments a capability is called with.
 const ANY_BITS: u64 = 128;
 
-/// One capability on problems that have a solution, in both scalars.
+/// One capability on problems that have a solution.
 struct Problem {
     name: &'static str,
-    f32: fn(&mut Sink),
-    f64: fn(&mut Sink),
+    call: fn(&mut Sink),
 }
 
+/// The problems in one scalar, so that a program which asks in `f32` alone holds no code in `f64`.
+struct Problems<T>(PhantomData<T>);
+
 macro_rules! problems {
-    ($($module:ident: $($function:ident)*;)*) => {
-        &[$($(Problem {
-            name: concat!(stringify!($module), "::", stringify!($function)),
-            f32: $module::$function::<f32>,
-            f64: $module::$function::<f64>,
-        },)*)*]
+    ($table:ident; $($module:ident: $($function:ident)*;)*) => {
+        impl<T: Real> Problems<T> {
+            const $table: &[Problem] = &[$($(Problem {
+                name: concat!(stringify!($module), "::", stringify!($function)),
+                call: $module::$function::<T>,
+            },)*)*];
+        }
     };
 }
 
-const PROBLEMS: &[Problem] = problems! {
+problems! { MINIMAL;
     solvers: relpose_5pt relpose_7pt relpose_8pt relpose_upright_3pt homography p3p abspose_upright_2pt abspose_npt
         abspose_planar resection rotation translation absolute_orientation;
     geometry: cameras poses motions_of_matrices triangulation residuals decompositions;
+}
+problems! { ROBUST;
     estimate: relative_pose_of_views homography_of_plane fundamental_of_views absolute_pose_of_points refine;
     window: bundle;
-};
+}
 
 /// What one capability answered.
 #[derive(Clone, Copy, Debug)]
@@ -71,19 +79,28 @@ impl Answer {
     }
 }
 
-/// Asks every capability, in `f32` and, if `wide`, in `f64`. Generic, so that all of the kernel in both scalars is compiled
-/// into the programs that call this, and not into every one that uses this crate.
-pub fn run(wide: bool, answered: &mut impl FnMut(Answer)) {
-    for problem in PROBLEMS {
-        for (scalar, call) in [("f32", problem.f32), ("f64", problem.f64)] {
-            if scalar == "f64" && !wide {
-                continue;
-            }
-            let mut sink = Sink::default();
-            call(&mut sink);
-            answered(Answer::new("problem", problem.name, scalar, &sink));
-        }
+impl Problem {
+    fn ask(&self, scalar: &'static str) -> Answer {
+        let mut sink = Sink::default();
+        (self.call)(&mut sink);
+        Answer::new("problem", self.name, scalar, &sink)
     }
+}
+
+/// Asks every capability, in both scalars. Generic, so that all of the kernel is compiled into the programs that call
+/// this, and not into every one that uses this crate.
+pub fn run(answered: &mut impl FnMut(Answer)) {
+    let (single, double) = (Problems::<f32>::MINIMAL, Problems::<f64>::MINIMAL);
+    let robust = (Problems::<f32>::ROBUST, Problems::<f64>::ROBUST);
+    for (single, double) in single.iter().zip(double).chain(robust.0.iter().zip(robust.1)) {
+        answered(single.ask("f32"));
+        answered(double.ask("f64"));
+    }
+}
+
+/// Asks the solvers and the geometry in `f32`: what fits a core with 256 kB of flash and 16 kB of RAM.
+pub fn run_small(answered: &mut impl FnMut(Answer)) {
+    Problems::<f32>::MINIMAL.iter().for_each(|problem| answered(problem.ask("f32")));
 }
 
 /// Asks every capability on arguments of any bits, in both scalars.
