@@ -26,7 +26,7 @@ fn rows(name: &str, geometry: Geometry, mut run: impl FnMut(&Scene) -> Trial) {
     let count = if cfg!(small_ram) { 4 } else { (PROBLEMS / 8).min(32) };
     row(name, "ransac", 0..count, SOLVED, |k| run(&scene(geometry, k)));
     if !cfg!(small_ram) {
-        row(name, "all wrong", 0..(PROBLEMS / 64).min(4), SOLVED, |k| {
+        row(name, "all wrong", 0..(PROBLEMS / 64).clamp(1, 4), SOLVED, |k| {
             let mut wrong = scene(geometry, k);
             wrong.x2 = scene(geometry, k + 77).x2;
             run(&wrong)
