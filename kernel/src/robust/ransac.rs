@@ -107,143 +107,237 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
     least_inliers: u32,
     mut keep_going: Option<&mut dyn FnMut(&Progress) -> bool>,
 ) -> Consensus<E::Model, T> {
-    let count = estimator.count();
-    let size = S as u32;
-    let all = from_u32::<T>(count);
-    let mut uniform = Sampler::<T>::uniform(options.seed, count);
-    let mut ranked = Sampler::<T>::ranked(options.seed, count, size);
+    let (count, size) = (estimator.count(), S as u32);
+    let manners = Manners {
+        discoveries: E::DISCOVERIES,
+        near_misses: E::NEAR_MISSES,
+        near_miss_interval: E::NEAR_MISS_INTERVAL,
+        score_passes: E::SCORE_PASSES,
+    };
+    let mut search = Search::new(options, order, count, size, least_inliers, manners);
     let mut models: [Option<(E::Model, Score<T>)>; KEPT] = [None; KEPT];
-    let mut spent = Progress::default();
-    let mut counts = ScoreCounts::default();
-    let mut refined_residuals = 0u64;
-    let mut minimal_cost = T::MAX;
-    let mut minimal_inliers = 0;
-    let mut needed = u32::MAX;
-    let mut discoveries = 0;
-    let same = all * lit(SAME_OPTIMUM);
-    let mut gate = gate::<T>(T::MAX, least_inliers, count, &counts);
-    let budget = options.budget;
-    // What may be spent when another hypothesis is looked at, and whether more has been.
-    let one_score = E::SCORE_PASSES as u64 * count as u64;
-    let last_start = budget.max_residuals.saturating_sub(one_score);
-    let mut exhausted = budget.max_residuals < one_score;
-    let mut stop = StopReason::MaxIterations;
-
-    while spent.iterations < budget.max_iterations {
-        let patience = if discoveries < E::DISCOVERIES { PATIENCE } else { 1 };
-        if spent.iterations >= core::cmp::max(needed.saturating_mul(patience), options.min_iterations) {
-            stop = StopReason::Confident;
-            break;
-        }
-        if spent.solver_calls >= budget.max_solver_calls {
-            stop = StopReason::MaxSolverCalls;
-            break;
-        }
-        if exhausted || spent.residuals >= budget.max_residuals {
-            stop = StopReason::MaxResiduals;
-            break;
-        }
-        if spent.iterations > 0
-            && spent.iterations.is_multiple_of(Guide::<T>::INTERVAL)
-            && let Some(ask) = keep_going.as_mut()
-            && !ask(&spent)
-        {
-            stop = StopReason::Interrupted;
-            break;
-        }
-        // Ranked samples first, and every other time.
-        let order = if spent.iterations.is_multiple_of(2) { order } else { None };
-        let sampler = if order.is_some() { &mut ranked } else { &mut uniform };
-        let Some(mut sample) = sampler.sample::<S>(spent.iterations) else { break };
-        spent.iterations += 1;
-        if let Some(order) = order {
-            for entry in &mut sample {
-                *entry = order.get(*entry as usize).copied().unwrap_or(0);
-            }
-        }
-
-        // Near misses are optimised too, at a bounded rate.
-        let near = minimal_cost < T::MAX
-            && spent.refinements < E::NEAR_MISSES + spent.iterations / E::NEAR_MISS_INTERVAL;
-        let bound = if near { all - (all - minimal_cost) * lit(SLACK) } else { minimal_cost };
+    let mut sample = [0; S];
+    while search.next(&mut sample, &mut keep_going) {
+        let bound = search.bound();
         let mut leader: Option<(E::Model, Score<T>)> = None;
-        let mut hypotheses = 0;
         let solved = estimator.generate(&sample, &mut |model| {
-            exhausted |= counts.residuals + refined_residuals > last_start;
-            if exhausted {
+            if !search.takes_hypothesis() {
                 return;
             }
-            hypotheses += 1;
-            let Some(model) = &estimator.polish(model, &mut counts) else { return };
-            gate.bound = bound;
-            let score = estimator.score(model, &gate, &mut counts);
-            let Some(score) = score else { return };
-            if score.cost < minimal_cost {
-                minimal_cost = score.cost;
-                minimal_inliers = score.inliers;
+            let Some(model) = &estimator.polish(model, &mut search.counts) else { return };
+            search.gate.bound = bound;
+            let Some(score) = estimator.score(model, &search.gate, &mut search.counts) else { return };
+            if score.cost < search.minimal.cost {
+                search.minimal = score;
             }
             if leader.is_none_or(|(_, best)| score.cost < best.cost) {
                 leader = Some((*model, score));
             }
         });
-        spent.solver_calls += solved as u32;
-        spent.hypotheses += hypotheses;
-        spent.residuals = counts.residuals + refined_residuals;
+        search.spent.solver_calls += solved as u32;
+        search.add_up();
 
         let Some((model, score)) = leader else { continue };
         let mut candidate = (model, score);
-        if spent.residuals < budget.max_residuals {
-            spent.refinements += 1;
-            if let Some(refined) = estimator.refine(&model, &mut refined_residuals) {
+        if search.spent.residuals < options.budget.max_residuals {
+            search.spent.refinements += 1;
+            if let Some(refined) = estimator.refine(&model, &mut search.refined_residuals) {
                 let bound = Gate::at(score.cost);
-                if let Some(better) = estimator.score(&refined, &bound, &mut counts) {
+                if let Some(better) = estimator.score(&refined, &bound, &mut search.counts) {
                     candidate = (refined, better);
                 }
             }
-            spent.residuals = counts.residuals + refined_residuals;
+            search.add_up();
         }
-        let leads = models[0].is_none_or(|(_, best)| candidate.1.cost < best.cost);
+        let best = models[0].map(|(_, score)| score);
+        let leads = best.is_none_or(|best| candidate.1.cost < best.cost);
         if leads && estimator.reject(&candidate.0) {
             continue;
         }
-        discoveries = match models[0] {
-            Some((_, best)) if candidate.1.cost > best.cost + same => discoveries,
-            Some((_, best)) if candidate.1.cost > best.cost - same => discoveries + 1,
-            _ => 1,
-        };
         keep(&mut models, candidate);
-        if leads {
-            spent.inliers = candidate.1.inliers;
-            needed = iterations_needed(options.confidence, spent.inliers, count, size);
-            gate = self::gate(minimal_cost, core::cmp::max(least_inliers, minimal_inliers), count, &counts);
+        search.has_kept(&candidate.1, best.as_ref());
+    }
+    Consensus { models, report: search.report(models[0].map(|(_, score)| score)) }
+}
+
+/// An estimator's constants.
+struct Manners {
+    discoveries: u32,
+    near_misses: u32,
+    near_miss_interval: u32,
+    score_passes: u32,
+}
+
+/// What a run keeps beside its models: the same code for every estimator.
+struct Search<'a, T> {
+    options: &'a RansacOptions<T>,
+    order: Option<&'a [u32]>,
+    count: u32,
+    size: u32,
+    least_inliers: u32,
+    manners: Manners,
+    uniform: Sampler<T>,
+    ranked: Sampler<T>,
+    spent: Progress,
+    counts: ScoreCounts,
+    refined_residuals: u64,
+    /// Of the best minimal model.
+    minimal: Score<T>,
+    /// Iterations for the best optimised model.
+    needed: u32,
+    discoveries: u32,
+    gate: Gate<T>,
+    /// What may be spent when another hypothesis is looked at, and whether more has been.
+    last_start: u64,
+    exhausted: bool,
+    stop: StopReason,
+}
+
+impl<'a, T: Real> Search<'a, T> {
+    fn new(
+        options: &'a RansacOptions<T>,
+        order: Option<&'a [u32]>,
+        count: u32,
+        size: u32,
+        least_inliers: u32,
+        manners: Manners,
+    ) -> Self {
+        let counts = ScoreCounts::default();
+        let one_score = manners.score_passes as u64 * count as u64;
+        Self {
+            options,
+            order,
+            count,
+            size,
+            least_inliers,
+            manners,
+            uniform: Sampler::uniform(options.seed, count),
+            ranked: Sampler::ranked(options.seed, count, size),
+            spent: Progress::default(),
+            gate: gate(T::MAX, least_inliers, count, &counts),
+            counts,
+            refined_residuals: 0,
+            minimal: Score { cost: T::MAX, inliers: 0 },
+            needed: u32::MAX,
+            discoveries: 0,
+            last_start: options.budget.max_residuals.saturating_sub(one_score),
+            exhausted: options.budget.max_residuals < one_score,
+            stop: StopReason::MaxIterations,
         }
     }
 
-    let best = models[0].map(|(_, score)| score);
-    let inliers = best.map_or(0, |score| score.inliers);
-    Consensus {
-        models,
-        report: RansacReport {
-            spent,
-            stop,
-            inliers,
-            cost: best.map_or(from_u32(count), |score| score.cost),
-            miss_probability: miss_probability(spent.iterations, inliers, count, size),
-            excluded_inlier_ratio: undetected_inlier_ratio(options.confidence, spent.iterations, count, size),
-        },
+    /// Draws the sample of another iteration; false where the run ends.
+    fn next(
+        &mut self,
+        sample: &mut [u32],
+        keep_going: &mut Option<&mut dyn FnMut(&Progress) -> bool>,
+    ) -> bool {
+        let (spent, budget) = (&mut self.spent, &self.options.budget);
+        if spent.iterations >= budget.max_iterations {
+            return false;
+        }
+        let patience = if self.discoveries < self.manners.discoveries { PATIENCE } else { 1 };
+        if spent.iterations
+            >= core::cmp::max(self.needed.saturating_mul(patience), self.options.min_iterations)
+        {
+            self.stop = StopReason::Confident;
+            return false;
+        }
+        if spent.solver_calls >= budget.max_solver_calls {
+            self.stop = StopReason::MaxSolverCalls;
+            return false;
+        }
+        if self.exhausted || spent.residuals >= budget.max_residuals {
+            self.stop = StopReason::MaxResiduals;
+            return false;
+        }
+        if spent.iterations > 0
+            && spent.iterations.is_multiple_of(Guide::<T>::INTERVAL)
+            && let Some(ask) = keep_going.as_mut()
+            && !ask(spent)
+        {
+            self.stop = StopReason::Interrupted;
+            return false;
+        }
+        // Ranked samples first, and every other time.
+        let order = if spent.iterations.is_multiple_of(2) { self.order } else { None };
+        let sampler = if order.is_some() { &mut self.ranked } else { &mut self.uniform };
+        if !sampler.draw(spent.iterations, sample) {
+            return false;
+        }
+        spent.iterations += 1;
+        if let Some(order) = order {
+            for entry in sample {
+                *entry = order.get(*entry as usize).copied().unwrap_or(0);
+            }
+        }
+        true
+    }
+
+    /// The cost up to which a hypothesis is of interest: near misses are optimised too, at a bounded rate.
+    fn bound(&self) -> T {
+        let (all, least) = (from_u32::<T>(self.count), self.minimal.cost);
+        let later = self.spent.iterations.checked_div(self.manners.near_miss_interval).unwrap_or(0);
+        let limit = self.manners.near_misses + later;
+        let near = least < T::MAX && self.spent.refinements < limit;
+        if near { all - (all - least) * lit(SLACK) } else { least }
+    }
+
+    /// Whether another hypothesis is looked at, which is then counted.
+    #[inline]
+    fn takes_hypothesis(&mut self) -> bool {
+        self.exhausted |= self.counts.residuals + self.refined_residuals > self.last_start;
+        self.spent.hypotheses += !self.exhausted as u32;
+        !self.exhausted
+    }
+
+    fn add_up(&mut self) {
+        self.spent.residuals = self.counts.residuals + self.refined_residuals;
+    }
+
+    /// After another model has been kept beside the best one so far.
+    fn has_kept(&mut self, score: &Score<T>, best: Option<&Score<T>>) {
+        let same = from_u32::<T>(self.count) * lit(SAME_OPTIMUM);
+        self.discoveries = match best {
+            Some(best) if score.cost > best.cost + same => self.discoveries,
+            Some(best) if score.cost > best.cost - same => self.discoveries + 1,
+            _ => 1,
+        };
+        if best.is_none_or(|best| score.cost < best.cost) {
+            self.spent.inliers = score.inliers;
+            self.needed = iterations_needed(self.options.confidence, score.inliers, self.count, self.size);
+            let inliers = core::cmp::max(self.least_inliers, self.minimal.inliers);
+            self.gate = gate(self.minimal.cost, inliers, self.count, &self.counts);
+        }
+    }
+
+    fn report(&self, best: Option<Score<T>>) -> RansacReport<T> {
+        let (iterations, count, size) = (self.spent.iterations, self.count, self.size);
+        let best = best.unwrap_or(Score { cost: from_u32(count), inliers: 0 });
+        RansacReport {
+            spent: self.spent,
+            stop: self.stop,
+            inliers: best.inliers,
+            cost: best.cost,
+            miss_probability: miss_probability(iterations, best.inliers, count, size),
+            excluded_inlier_ratio: undetected_inlier_ratio(self.options.confidence, iterations, count, size),
+        }
     }
 }
 
 /// The sequential test between `inliers` of `count` and the share of inliers that rejected models had so far.
 fn gate<T: Real>(bound: T, inliers: u32, count: u32, counts: &ScoreCounts) -> Gate<T> {
-    let ratio = |a: u64, b: u64| lit::<T>(a as f64) / lit::<T>(b as f64);
+    // Halved until they fit 32 bits.
+    let halvings = 32u32.saturating_sub(counts.rejected_residuals.leading_zeros());
+    let ratio = |a: u32, b: u32| from_u32::<T>(a) / from_u32::<T>(b);
     // Before enough is known, 5 %; a measured share is kept within what separates right from wrong.
     let bad = if counts.rejected_residuals < 500 {
         lit(0.05)
     } else {
-        min(ratio(counts.rejected_inliers, counts.rejected_residuals), lit(0.5))
+        let share = |n: u64| (n >> halvings) as u32;
+        min(ratio(share(counts.rejected_inliers), share(counts.rejected_residuals)), lit(0.5))
     };
-    Gate::new(bound, ratio(inliers as u64, core::cmp::max(count, 1) as u64), max(bad, lit(0.01)))
+    Gate::new(bound, ratio(inliers, core::cmp::max(count, 1)), max(bad, lit(0.01)))
 }
 
 /// Inserts a model by its cost; the worst falls off.

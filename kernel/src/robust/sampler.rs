@@ -91,12 +91,19 @@ impl<T: Real> Sampler<T> {
     #[inline]
     #[must_use]
     pub fn sample<const S: usize>(&mut self, iteration: u32) -> Option<[u32; S]> {
-        if (self.count as u64) < S as u64 || S == 0 {
-            return None;
+        let mut sample = [0; S];
+        self.draw(iteration, &mut sample).then_some(sample)
+    }
+
+    /// [`sample`](Self::sample) of any size: false where there is none.
+    pub(super) fn draw(&mut self, iteration: u32, chosen: &mut [u32]) -> bool {
+        let size = chosen.len();
+        if (self.count as u64) < size as u64 || size == 0 {
+            return false;
         }
         // A sampler ranked for smaller samples has too small a pool for these.
-        if self.growth.as_ref().is_some_and(|growth| (growth.pool as u64) < S as u64) {
-            return None;
+        if self.growth.as_ref().is_some_and(|growth| (growth.pool as u64) < size as u64) {
+            return false;
         }
         let key = mix(self.seed.wrapping_add((iteration as u64).wrapping_mul(STEP)));
         let mut pool = self.count;
@@ -106,7 +113,7 @@ impl<T: Real> Sampler<T> {
             // and only the first few shares are smaller than one sample.
             if from_u32::<T>(iteration) >= growth.until && growth.pool < self.count {
                 let grown = growth.samples * from_u32::<T>(growth.pool + 1)
-                    / from_u32::<T>(growth.pool + 1 - smallest([S as u32, growth.pool]));
+                    / from_u32::<T>(growth.pool + 1 - core::cmp::min(size as u32, growth.pool));
                 growth.until += crate::real::max(grown - growth.samples, T::ONE);
                 growth.samples = grown;
                 growth.pool += 1;
@@ -116,23 +123,23 @@ impl<T: Real> Sampler<T> {
                 newest = Some(pool);
             }
         }
-        let mut chosen = [u32::MAX; S];
-        let draws = if newest.is_some() { S - 1 } else { S };
+        chosen.fill(u32::MAX);
+        let draws = size - newest.is_some() as usize;
         for (k, step) in (0..draws as u32).zip(1u64..) {
             let word = mix(key.wrapping_add(step.wrapping_mul(STEP)));
             // A number among those not chosen yet: walk up past the chosen ones, which are in rising order.
             let mut value = (((word >> 32) * (pool - k) as u64) >> 32) as u32;
-            for &taken in &chosen {
+            for &taken in &*chosen {
                 if taken <= value {
                     value += 1;
                 }
             }
-            insert(&mut chosen, value);
+            insert(chosen, value);
         }
         if let Some(newest) = newest {
-            insert(&mut chosen, newest);
+            insert(chosen, newest);
         }
-        Some(chosen)
+        true
     }
 }
 
@@ -142,7 +149,7 @@ fn smallest<const N: usize>(numbers: [u32; N]) -> u32 {
 
 /// Puts `value` into a rising list; the last entry falls off.
 #[inline]
-fn insert<const S: usize>(rising: &mut [u32; S], mut value: u32) {
+fn insert(rising: &mut [u32], mut value: u32) {
     for entry in rising {
         if value < *entry {
             core::mem::swap(entry, &mut value);
