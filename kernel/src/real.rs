@@ -45,6 +45,8 @@ pub trait Real: RealField + Copy + sealed::Sealed {
     fn to_f64(self) -> f64;
     /// The nearest value of this type to the integer `n`.
     fn from_u32(n: u32) -> Self;
+    /// The integer part, the nearest 32-bit number where that is out of range, 0 for NaN.
+    fn to_u32(self) -> u32;
 }
 
 macro_rules! impl_real {
@@ -112,6 +114,10 @@ macro_rules! impl_real {
             #[inline(always)]
             fn from_u32(n: u32) -> Self {
                 n as $t
+            }
+            #[inline(always)]
+            fn to_u32(self) -> u32 {
+                self as u32
             }
         }
     };

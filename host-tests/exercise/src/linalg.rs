@@ -10,7 +10,8 @@ pub(crate) fn scalar<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
     let (x, y) = (source.scalar::<T>(), source.scalar::<T>());
     let (sin, cos) = real::sin_cos(x);
     sink.numbers(&[sin, cos, real::sqrt(x), real::atan2(y, x), real::ln(x), real::exp(x), real::cbrt(x)]);
-    sink.numbers(&[real::abs(x), real::max(x, y), real::min(x, y), real::from_u32(source.byte().into())]);
+    let whole = real::from_u32(real::from_u32::<T>(source.byte().into()).to_u32());
+    sink.numbers(&[real::abs(x), real::max(x, y), real::min(x, y), whole]);
     sink.numbers(&[<T as Real>::from_f64(0.1), <T as Real>::from_u32(7)]);
     sink.flag(real::is_finite(x));
 }

@@ -108,7 +108,7 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 4> for TransferProblem<'_, T, B>
             if k % 2 == 1 && gate.rejects(tally.cost(), tally.inliers(), from_u32(seen)) {
                 counts.residuals += seen as u64;
                 counts.rejected_residuals += seen as u64;
-                counts.rejected_inliers += tally.inliers().to_f64() as u64;
+                counts.rejected_inliers += tally.inliers().to_u32() as u64;
                 return None;
             }
         }

@@ -10,7 +10,7 @@ use crate::Real;
 ///
 /// With `p = R x1 . t`, `q = x2 . t`, `r = R x1 . x2`: the depths that bring `d1 R x1 + t` nearest to `d2 x2` are
 /// `(q r - p |x2|^2) / D` and `(q |x1|^2 - p r) / D`, `D = |R x1 x x2|^2 >= 0`.
-#[inline(always)]
+#[inline]
 pub(super) fn depth_signs<T: Real>(p: T, q: T, r: T, x1_sq: T, x2_sq: T) -> (T, T) {
     (q * r - p * x2_sq, q * x1_sq - p * r)
 }

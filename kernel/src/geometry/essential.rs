@@ -262,7 +262,7 @@ impl<T: Real> TwistedPair<T> {
     }
 
     /// For which of the four poses the point of two bearings lies in front of both cameras.
-    #[inline(always)]
+    #[inline]
     fn sides(&self, x1: &Vector3<T>, x2: &Vector3<T>) -> [bool; 4] {
         let a = self.rotations[0] * x1;
         let (p, q, r) = (a.dot(&self.t), x2.dot(&self.t), a.dot(x2));

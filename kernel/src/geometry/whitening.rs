@@ -30,7 +30,7 @@ pub(crate) struct Whitening<T: Real> {
 impl<T: Real> Whitening<T> {
     /// `None` where the points lie on one line of the image (their vectors in a plane), to within rounding, or are not
     /// finite.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn new(points: &[Vector3<T>]) -> Option<Self> {
         let (mut zz, mut xz, mut yz) = (T::ZERO, T::ZERO, T::ZERO);
         for p in points {
@@ -73,7 +73,7 @@ impl<T: Real> Whitening<T> {
     }
 
     /// `T x`
-    #[inline(always)]
+    #[inline]
     pub(crate) fn apply(&self, p: &Vector3<T>) -> Vector3<T> {
         Vector3::new(
             (p.x - self.a * p.z) * self.ix,
@@ -83,7 +83,7 @@ impl<T: Real> Whitening<T> {
     }
 
     /// `T`
-    #[inline(always)]
+    #[inline]
     pub(crate) fn matrix(&self) -> Matrix3<T> {
         let o = T::ZERO;
         Matrix3::new(

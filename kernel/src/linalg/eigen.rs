@@ -94,7 +94,7 @@ pub fn symmetric_eigen<T: Real, const N: usize>(a: &SMatrix<T, N, N>) -> Option<
 }
 
 /// The rotation of the plane (p, q), p < q, that makes element (p, q) zero.
-#[inline(always)]
+#[inline]
 fn rotate<T: Real, const N: usize>(m: &mut [[T; N]; N], v: &mut [[T; N]; N], p: usize, q: usize) {
     let apq = m[q][p];
     if apq == T::ZERO {
@@ -127,7 +127,7 @@ fn rotate<T: Real, const N: usize>(m: &mut [[T; N]; N], v: &mut [[T; N]; N], p: 
 }
 
 /// Sine, tangent and cosine of the smaller angle that makes `[[app, apq], [apq, aqq]]` diagonal. `apq` is not zero.
-#[inline(always)]
+#[inline]
 pub(super) fn jacobi_angle<T: Real>(app: T, apq: T, aqq: T) -> (T, T, T) {
     let theta = T::HALF * (aqq - app) / apq;
     // An overflow of theta^2 gives a zero angle, as it should.

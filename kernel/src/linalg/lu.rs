@@ -53,7 +53,9 @@ impl<T: Real, const N: usize> Lu<T, N> {
             // The largest of the column rises to row k by exchanges: no index is known only at run time.
             for i in k + 1..N {
                 if abs(rows[i][k]) > abs(rows[k][k]) {
-                    rows.swap(i, k);
+                    for j in 0..N {
+                        (rows[i][j], rows[k][j]) = (rows[k][j], rows[i][j]);
+                    }
                     order.swap(i, k);
                     odd = !odd;
                 }

@@ -62,7 +62,7 @@ pub fn null_space_refined<T: Real, const M: usize, const N: usize, const K: usiz
     reflect::<T, M, N, K, true>(rows)
 }
 
-#[inline(always)]
+#[inline]
 fn reflect<T: Real, const M: usize, const N: usize, const K: usize, const REFINE: bool>(
     rows: &[[T; N]; M],
 ) -> Option<[[T; N]; K]> {
@@ -162,7 +162,7 @@ fn reflect<T: Real, const M: usize, const N: usize, const K: usize, const REFINE
 }
 
 /// Applies the reflections, the last first, to K columns.
-#[inline(always)]
+#[inline]
 fn reflect_back<T: Real, const M: usize, const N: usize, const K: usize>(
     a: &[[T; M]; N],
     scale: &[T; M],

@@ -107,7 +107,7 @@ pub fn svd3<T: Real>(a: &Matrix3<T>) -> Option<Svd3<T>> {
 }
 
 /// Rotates the columns `a` and `b` so that they become orthogonal, and `va`, `vb` with them; true where they were.
-#[inline(always)]
+#[cfg_attr(not(small), inline(always))]
 fn orthogonalise<T: Real>(
     a: &mut Vector3<T>,
     b: &mut Vector3<T>,

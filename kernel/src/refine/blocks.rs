@@ -28,12 +28,12 @@ pub(crate) trait Block<T: Real>: Copy {
 }
 
 impl<T: Real, const W: usize> Block<T> for [Lanes<T>; W] {
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     fn zero() -> Self {
         [[T::ZERO; LANES]; W]
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     fn set_lane(&mut self, to: usize, source: &Self, from: usize) {
         for (target, lanes) in self.iter_mut().zip(source) {
             if let (Some(entry), Some(&value)) = (target.get_mut(to), lanes.get(from)) {
@@ -50,7 +50,7 @@ impl<T: Real, const W: usize> Block<T> for [Lanes<T>; W] {
         numbers.as_chunks_mut::<LANES>().0.as_chunks_mut::<W>().0
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     fn write_lane(&mut self, to: usize, numbers: &[T]) {
         for (target, &value) in self.iter_mut().zip(numbers) {
             if let Some(entry) = target.get_mut(to) {
@@ -96,7 +96,7 @@ pub(crate) type PlaneBlock<T> = [Lanes<T>; 4];
 pub(crate) type BearingBlock<T> = [Lanes<T>; 18];
 
 impl<T: Real> EpipolarBlock<T> for PlaneBlock<T> {
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     fn residual(&self, f: &Matrix3<T>) -> (Lanes<T>, Lanes<T>) {
         let m = &f.data.0;
         let (mut c, mut d) = ([T::ZERO; LANES], [T::ZERO; LANES]);
@@ -113,7 +113,7 @@ impl<T: Real> EpipolarBlock<T> for PlaneBlock<T> {
         (c, d)
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     fn gradient(&self, f: &Matrix3<T>) -> (Lanes<T>, [Lanes<T>; 9]) {
         let m = &f.data.0;
         let mut r = [T::ZERO; LANES];
@@ -152,24 +152,24 @@ impl<T: Real> EpipolarBlock<T> for PlaneBlock<T> {
         [self[0], self[1], other[2], other[3]]
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     fn planes(&self) -> (PlaneBlock<T>, Lanes<T>) {
         (*self, [T::ONE; LANES])
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     fn directions(&self) -> ([Lanes<T>; 3], [Lanes<T>; 3]) {
         let one = [T::ONE; LANES];
         ([self[0], self[1], one], [self[2], self[3], one])
     }
 }
 
-#[inline(always)]
+#[cfg_attr(not(small), inline(always))]
 fn dot<T: Real>(a: &[T; 3], b: &[T; 3]) -> T {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// `(f1, f2, l1 = F' f2, l2 = F f1)` of a lane.
+/// `(f1, f2, l1 = F' f2, l2 = F f1)` of a lane. Inlined, so that the lane is known to be one.
 #[inline(always)]
 fn lines<T: Real>(block: &BearingBlock<T>, f: &Matrix3<T>, l: usize) -> ([T; 3], [T; 3], [T; 3], [T; 3]) {
     let m = &f.data.0;
@@ -192,7 +192,7 @@ fn metrics<T: Real>(block: &BearingBlock<T>, l: usize, l1: &[T; 3], l2: &[T; 3])
 }
 
 impl<T: Real> EpipolarBlock<T> for BearingBlock<T> {
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     fn residual(&self, f: &Matrix3<T>) -> (Lanes<T>, Lanes<T>) {
         let (mut c, mut d) = ([T::ZERO; LANES], [T::ZERO; LANES]);
         for l in 0..LANES {
@@ -204,7 +204,7 @@ impl<T: Real> EpipolarBlock<T> for BearingBlock<T> {
         (c, d)
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     fn gradient(&self, f: &Matrix3<T>) -> (Lanes<T>, [Lanes<T>; 9]) {
         let mut r = [T::ZERO; LANES];
         let mut g = [[T::ZERO; LANES]; 9];
@@ -236,7 +236,7 @@ impl<T: Real> EpipolarBlock<T> for BearingBlock<T> {
         block
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     fn planes(&self) -> (PlaneBlock<T>, Lanes<T>) {
         let (mut plane, mut weight) = ([[T::ZERO; LANES]; 4], [T::ONE; LANES]);
         for l in 0..LANES {
@@ -253,7 +253,7 @@ impl<T: Real> EpipolarBlock<T> for BearingBlock<T> {
         (plane, weight)
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     fn directions(&self) -> ([Lanes<T>; 3], [Lanes<T>; 3]) {
         ([self[0], self[1], self[2]], [self[3], self[4], self[5]])
     }
@@ -261,7 +261,7 @@ impl<T: Real> EpipolarBlock<T> for BearingBlock<T> {
 
 /// Which lanes hold a point that lies in front of both cameras of a pose `X2 = R X1 + t`, or whose rays are parallel
 /// to within noise, so that its depth says nothing: `parallel_sq` is the squared sine up to which they are.
-#[inline(always)]
+#[cfg_attr(not(small), inline(always))]
 pub(crate) fn in_front<T: Real>(
     f1: &[Lanes<T>; 3],
     f2: &[Lanes<T>; 3],

@@ -30,7 +30,7 @@ struct Transfer<T> {
 }
 
 impl<T: Real> Transfer<T> {
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     fn new(h: &Matrix3<T>, x1: T, y1: T, x2: T, y2: T) -> Self {
         let m = &h.data.0;
         let inverse_z = T::ONE / (m[0][2] * x1 + m[1][2] * y1 + m[2][2]);
@@ -50,7 +50,7 @@ impl<T: Real> Transfer<T> {
 }
 
 /// Squared transfer errors of a block; `T::MAX` where the transferred point is not in front of view 2 or not a number.
-#[inline(always)]
+#[cfg_attr(not(small), inline(always))]
 pub(crate) fn transfer_sq<T: Real>(h: &Matrix3<T>, block: &PlaneBlock<T>, weight: &Lanes<T>) -> Lanes<T> {
     let mut squared = [T::MAX; LANES];
     for l in 0..LANES {
@@ -76,7 +76,7 @@ struct Sums<T> {
 
 impl<T: Real> Sums<T> {
     /// Adds the lanes of a block of which the first `filled` count.
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     fn add(
         &mut self,
         h: &Matrix3<T>,
@@ -128,19 +128,23 @@ impl<T: Real> Sums<T> {
     }
 }
 
-/// One pass over all correspondences for a model of `x2 ~ H x1`. Those beyond the loss's support are left out; the others
-/// are packed into full blocks first, so that the derivatives are computed for them alone.
-pub(crate) fn transfer_equations<T, B, M, const P: usize>(
+/// The normal equations of all nine entries of `H`.
+struct EntryEquations<T> {
+    /// `J' W J`: rows and columns of H, of either side.
+    products: [[[[T; 3]; 3]; 3]; 3],
+    /// `J' W r`.
+    slopes: [[T; 3]; 3],
+    cost: T,
+    active: u32,
+}
+
+/// One pass over all correspondences for `x2 ~ H x1`. Those beyond the loss's support are left out; the others are packed
+/// into full blocks first, so that the derivatives are computed for them alone.
+fn entry_equations<T: Real, B: EpipolarBlock<T>>(
     data: BlockSlice<'_, B>,
-    model: &M,
+    h: &Matrix3<T>,
     loss: &Loss<T>,
-) -> NormalEquations<T, P>
-where
-    T: Real,
-    B: EpipolarBlock<T>,
-    M: Manifold<T, P>,
-{
-    let h = model.matrix();
+) -> EntryEquations<T> {
     let zero = [T::ZERO; LANES];
     let mut sums = Sums { products: [[zero; 6]; 6], slopes: [[zero; 3]; 3], cost: zero };
     let support = loss.support().unwrap_or(T::MAX);
@@ -151,7 +155,7 @@ where
     let mut left = data.count;
     for block in data.blocks {
         let (plane, weights) = block.planes();
-        let squared = transfer_sq(&h, &plane, &weights);
+        let squared = transfer_sq(h, &plane, &weights);
         for l in 0..LANES {
             if l < left && squared[l] < support {
                 pending.set_lane(filled, &plane, l);
@@ -161,7 +165,7 @@ where
                 filled += 1;
                 active += 1;
                 if filled == LANES {
-                    sums.add(&h, &pending, &pending_weights, loss, LANES);
+                    sums.add(h, &pending, &pending_weights, loss, LANES);
                     filled = 0;
                 }
             }
@@ -169,17 +173,28 @@ where
         left = left.saturating_sub(LANES);
     }
     if filled > 0 {
-        sums.add(&h, &pending, &pending_weights, loss, filled);
+        sums.add(h, &pending, &pending_weights, loss, filled);
     }
     let total = |lanes: &Lanes<T>| (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
-    let mut products = [[T::ZERO; 6]; 6];
-    for (totals, lanes) in products.iter_mut().zip(&sums.products) {
-        for (sum, lanes) in totals.iter_mut().zip(lanes) {
-            *sum = total(lanes);
-        }
-    }
-    let products = symmetric(products.map(symmetric));
-    let slopes = sums.slopes.map(|row| row.map(|lanes| total(&lanes)));
+    let products = symmetric(sums.products.each_ref().map(|row| symmetric(row.each_ref().map(total))));
+    let slopes = sums.slopes.each_ref().map(|row| row.each_ref().map(total));
+    let outside = (data.count as u32).saturating_sub(active);
+    let cost = total(&sums.cost) + crate::real::from_u32::<T>(outside) * beyond;
+    EntryEquations { products, slopes, cost, active }
+}
+
+/// The normal equations of a model of `x2 ~ H x1`.
+pub(crate) fn transfer_equations<T, B, M, const P: usize>(
+    data: BlockSlice<'_, B>,
+    model: &M,
+    loss: &Loss<T>,
+) -> NormalEquations<T, P>
+where
+    T: Real,
+    B: EpipolarBlock<T>,
+    M: Manifold<T, P>,
+{
+    let EntryEquations { products, slopes, cost, active } = entry_equations(data, &model.matrix(), loss);
     let tangents = model.tangents();
     let mut hessian = SMatrix::<T, P, P>::zeros();
     let mut gradient = SVector::<T, P>::zeros();
@@ -212,8 +227,6 @@ where
         }
         gradient.data.0[0][q] = sum;
     }
-    let outside = (data.count as u32).saturating_sub(active);
-    let cost = total(&sums.cost) + crate::real::from_u32::<T>(outside) * beyond;
     NormalEquations { hessian, gradient, cost, active }
 }
 

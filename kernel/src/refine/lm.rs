@@ -15,7 +15,7 @@ pub(crate) trait Manifold<T: Real, const P: usize>: Copy {
     /// Its derivative by each local parameter, row by row.
     fn tangents(&self) -> [[T; 9]; P];
     /// Which correspondences of a block the model may explain at all (those in front of the cameras).
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     fn admits<B: EpipolarBlock<T>>(&self, _block: &B) -> [bool; LANES] {
         [true; LANES]
     }
@@ -59,7 +59,7 @@ struct Sums<T, const P: usize> {
 
 impl<T: Real, const P: usize> Sums<T, P> {
     /// Adds the lanes of a block of which the first `filled` count.
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     fn add<B: EpipolarBlock<T>>(
         &mut self,
         block: &B,
@@ -104,7 +104,7 @@ impl<T: Real, const P: usize> Sums<T, P> {
     }
 }
 
-#[inline(always)]
+#[cfg_attr(not(small), inline(always))]
 fn total<T: Real>(lanes: &Lanes<T>) -> T {
     (lanes[0] + lanes[1]) + (lanes[2] + lanes[3])
 }

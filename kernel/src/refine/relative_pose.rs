@@ -125,7 +125,7 @@ impl<T: Real> PoseModel<T> {
     }
 }
 
-#[inline(always)]
+#[cfg_attr(not(small), inline(always))]
 fn cross<T: Real>(a: &[T; 3], b: &[T; 3]) -> [T; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
@@ -161,7 +161,7 @@ impl<T: Real> Manifold<T, 5> for PoseModel<T> {
         result
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     fn admits<B: EpipolarBlock<T>>(&self, block: &B) -> [bool; LANES] {
         let (mut f1, mut f2) = block.directions();
         let (s1, s2) = (self.scales.inverse1(), self.scales.inverse2());

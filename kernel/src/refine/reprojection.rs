@@ -70,12 +70,12 @@ pub(crate) type PlanePointBlock<T> = [Lanes<T>; 5];
 pub(crate) type BearingPointBlock<T> = [Lanes<T>; 12];
 
 impl<T: Real> ReprojectionBlock<T> for PlanePointBlock<T> {
-    #[inline(always)]
+    #[inline]
     fn points(&self) -> [&Lanes<T>; 3] {
         [&self[2], &self[3], &self[4]]
     }
 
-    #[inline(always)]
+    #[inline]
     fn scaled_residual(&self, y: &[Lanes<T>; 3], focal: [T; 2]) -> [Lanes<T>; 3] {
         let mut r = [[T::ZERO; LANES]; 2];
         for l in 0..LANES {
@@ -85,7 +85,7 @@ impl<T: Real> ReprojectionBlock<T> for PlanePointBlock<T> {
         [r[0], r[1], y[2]]
     }
 
-    #[inline(always)]
+    #[inline]
     fn rows(&self, l: usize, focal: [T; 2]) -> [[T; 3]; 3] {
         let zero = T::ZERO;
         [[focal[0], zero, -self[0][l]], [zero, focal[1], -self[1][l]], [zero, zero, T::ONE]]
@@ -93,12 +93,12 @@ impl<T: Real> ReprojectionBlock<T> for PlanePointBlock<T> {
 }
 
 impl<T: Real> ReprojectionBlock<T> for BearingPointBlock<T> {
-    #[inline(always)]
+    #[inline]
     fn points(&self) -> [&Lanes<T>; 3] {
         [&self[9], &self[10], &self[11]]
     }
 
-    #[inline(always)]
+    #[inline]
     fn scaled_residual(&self, y: &[Lanes<T>; 3], _: [T; 2]) -> [Lanes<T>; 3] {
         let mut r = [[T::ZERO; LANES]; 3];
         for k in 0..3 {
@@ -110,7 +110,7 @@ impl<T: Real> ReprojectionBlock<T> for BearingPointBlock<T> {
         r
     }
 
-    #[inline(always)]
+    #[inline]
     fn rows(&self, l: usize, _: [T; 2]) -> [[T; 3]; 3] {
         let mut rows = [[T::ZERO; 3]; 3];
         for k in 0..3 {
@@ -121,7 +121,7 @@ impl<T: Real> ReprojectionBlock<T> for BearingPointBlock<T> {
 }
 
 /// `R X` of four points.
-#[inline(always)]
+#[inline]
 fn rotate<T: Real>(rotation: &Matrix3<T>, x: &[&Lanes<T>; 3]) -> [Lanes<T>; 3] {
     let m = &rotation.data.0;
     let mut y = [[T::ZERO; LANES]; 3];
@@ -133,7 +133,7 @@ fn rotate<T: Real>(rotation: &Matrix3<T>, x: &[&Lanes<T>; 3]) -> [Lanes<T>; 3] {
     y
 }
 
-#[inline(always)]
+#[inline]
 fn translate<T: Real>(y: &mut [Lanes<T>; 3], t: &Vector3<T>) {
     for (lanes, &t) in y.iter_mut().zip(&t.data.0[0]) {
         for value in lanes {
@@ -143,7 +143,7 @@ fn translate<T: Real>(y: &mut [Lanes<T>; 3], t: &Vector3<T>) {
 }
 
 /// The squared residuals of a block in px^2 times the squared depth, and the depth: positive in front.
-#[inline(always)]
+#[inline]
 pub(crate) fn squared<T: Real, B: ReprojectionBlock<T>>(
     block: &B,
     pose: &CameraPose<T>,
@@ -167,7 +167,7 @@ struct Sums<T> {
 
 impl<T: Real> Sums<T> {
     /// Adds the lanes of a block of which the first `filled` count.
-    #[inline(always)]
+    #[inline]
     fn add<B: ReprojectionBlock<T>>(
         &mut self,
         block: &B,
@@ -230,7 +230,7 @@ impl<T: Real> Sums<T> {
     }
 }
 
-#[inline(always)]
+#[inline]
 fn total<T: Real>(lanes: &Lanes<T>) -> T {
     (lanes[0] + lanes[1]) + (lanes[2] + lanes[3])
 }

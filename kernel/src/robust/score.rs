@@ -66,7 +66,7 @@ impl<T: Real> Gate<T> {
     }
 
     /// True where a hypothesis with this tally has lost.
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     #[must_use]
     pub fn rejects(&self, cost: T, inliers: T, seen: T) -> bool {
         cost > self.bound || inliers * self.per_inlier + (seen - inliers) * self.per_outlier > self.limit
@@ -82,14 +82,14 @@ pub struct Tally<T> {
 
 impl<T: Real> Tally<T> {
     /// Nothing seen.
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     #[must_use]
     pub fn new() -> Self {
         Self { cost: [T::ZERO; LANES], inliers: [T::ZERO; LANES] }
     }
 
     /// Adds squared residuals in units of the squared threshold. What is not below 1 (NaN too) costs 1.
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     pub fn add(&mut self, squared: &Lanes<T>) {
         for l in 0..LANES {
             let inside = squared[l] < T::ONE;
@@ -111,14 +111,14 @@ impl<T: Real> Tally<T> {
     }
 
     /// The cost so far.
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     #[must_use]
     pub fn cost(&self) -> T {
         (self.cost[0] + self.cost[1]) + (self.cost[2] + self.cost[3])
     }
 
     /// The inliers so far, as a number of the scalar type (exact below 2^24).
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     #[must_use]
     pub fn inliers(&self) -> T {
         (self.inliers[0] + self.inliers[1]) + (self.inliers[2] + self.inliers[3])
@@ -128,7 +128,7 @@ impl<T: Real> Tally<T> {
     #[inline]
     #[must_use]
     pub fn score(&self) -> Score<T> {
-        Score { cost: self.cost(), inliers: self.inliers().to_f64() as u32 }
+        Score { cost: self.cost(), inliers: self.inliers().to_u32() }
     }
 }
 

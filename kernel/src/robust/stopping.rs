@@ -35,8 +35,8 @@ fn minus_ln_1m<T: Real>(p: T) -> T {
     } else if p < lit::<T>(0.01) {
         // Five terms of the series: the sixth is below 1e-12 relative to the first.
         let mut sum = T::ZERO;
-        for k in [5.0, 4.0, 3.0, 2.0, 1.0] {
-            sum = sum * p + T::ONE / lit::<T>(k);
+        for k in [5, 4, 3, 2, 1] {
+            sum = sum * p + T::ONE / from_u32::<T>(k);
         }
         sum * p
     } else {
@@ -68,7 +68,7 @@ pub fn iterations_needed<T: Real>(confidence: T, inliers: u32, count: u32, sampl
     }
     let n = minus_ln_1m(confidence) / minus_ln_1m(p);
     // Rounded up; beyond 2^31 there is no point in counting.
-    if n < lit::<T>(2_147_483_648.0) { n.to_f64() as u32 + 1 } else { u32::MAX }
+    if n < lit::<T>(2_147_483_648.0) { n.to_u32() + 1 } else { u32::MAX }
 }
 
 /// The probability that none of `iterations` samples held inliers only.

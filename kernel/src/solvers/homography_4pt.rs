@@ -94,7 +94,7 @@ struct Basis<T: Real> {
 
 impl<T: Real> Basis<T> {
     /// `None` where a triple is collinear.
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     fn new(x: &[Vector3<T>; 4]) -> Option<Self> {
         let (d1, d2, d3) = (x[1] - x[0], x[2] - x[0], x[3] - x[0]);
         let (n, r1, r2, r3) = (d1.cross(&d2), d2.cross(&x[0]), x[0].cross(&d1), x[0].cross(&d3));

@@ -107,7 +107,7 @@ fn estimate<T: Real>(x1: &[Vector3<T>], x2: &[Vector3<T>]) -> Option<Homography<
 
 /// Two vectors of the length of `q`, orthogonal to it and to each other: rows of the reflection that takes `q` to the
 /// z axis.
-#[inline(always)]
+#[inline]
 fn perpendiculars<T: Real>(q: &Vector3<T>) -> [Vector3<T>; 2] {
     let length = sqrt(q.norm_squared());
     let sum = length + abs(q.z);

@@ -151,7 +151,7 @@ fn linear_estimate<T: Real>(
 }
 
 /// The equations of up to `B` correspondences; rows of zeros follow them.
-#[inline(always)]
+#[inline]
 fn rows<T: Real, const B: usize>(
     x1: &[Vector3<T>],
     x2: &[Vector3<T>],

@@ -119,7 +119,7 @@ pub fn relpose_upright_3pt<T: Real>(x1: &[Vector3<T>; 3], x2: &[Vector3<T>; 3]) 
 }
 
 /// The pose of the rotation by a root of the determinant; `None` where a point is behind a camera.
-#[inline(always)]
+#[inline]
 fn pose_of_angle<T: Real>(c: T, s: T, x1: &[Vector3<T>; 3], x2: &[Vector3<T>; 3]) -> Option<Pose<T>> {
     let turn = |v: &Vector3<T>| Vector3::new(c * v.x + s * v.z, v.y, c * v.z - s * v.x);
     let ([a0, a1, a2], [z0, z1, z2]) = (x1, x2);
@@ -147,7 +147,7 @@ fn pose_of_angle<T: Real>(c: T, s: T, x1: &[Vector3<T>; 3], x2: &[Vector3<T>; 3]
 
 /// The unit translation `t = +-n0 x n1` that has three points in front, two of them given by the turned first bearing `y`,
 /// the second `z` and the normal `n = y x z`.
-#[inline(always)]
+#[inline]
 fn in_front<T: Real>(
     t: Vector3<T>,
     [y0, z0, n0]: [&Vector3<T>; 3],
@@ -174,18 +174,18 @@ fn in_front<T: Real>(
 struct Complex<T>(T, T);
 
 impl<T: Real> Complex<T> {
-    #[inline(always)]
+    #[inline]
     fn scale(self, k: T) -> Self {
         Self(self.0 * k, self.1 * k)
     }
 
-    #[inline(always)]
+    #[inline]
     fn sub(self, other: Self) -> Self {
         Self(self.0 - other.0, self.1 - other.1)
     }
 
     /// `conj(self) other`
-    #[inline(always)]
+    #[inline]
     fn conj_mul(self, other: Self) -> Self {
         Self(self.0 * other.0 + self.1 * other.1, self.0 * other.1 - self.1 * other.0)
     }

@@ -58,7 +58,7 @@ impl<'a, T: Real, B: ReprojectionBlock<T>> PoseProblem<'a, T, B> {
     }
 
     /// Squared residuals of a block in units of the squared threshold; of a point behind the camera, 1.
-    #[inline(always)]
+    #[inline]
     fn relative(&self, block: &B, pose: &CameraPose<T>, scale: T) -> Lanes<T> {
         let (square, depth) = squared(block, pose, self.focal);
         let mut relative = [T::ZERO; LANES];
@@ -140,7 +140,7 @@ impl<'a, T: Real, B: ReprojectionBlock<T>> PoseProblem<'a, T, B> {
             if gate.rejects(tally.cost(), tally.inliers(), from_u32(seen)) {
                 counts.residuals += seen as u64;
                 counts.rejected_residuals += seen as u64;
-                counts.rejected_inliers += tally.inliers().to_f64() as u64;
+                counts.rejected_inliers += tally.inliers().to_u32() as u64;
                 return None;
             }
         }

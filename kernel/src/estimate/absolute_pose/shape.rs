@@ -51,9 +51,9 @@ pub(super) fn shape_of_inliers<T: Real, B: ReprojectionBlock<T>>(
     }
 
     // The line through the inliers, without those that are far from a first one.
-    let all = Axes::of(problem, pose, |_| true);
+    let all = Axes::of(problem, pose, None);
     let reach = lit::<T>(4.0) * all.values[1] / from_u32(core::cmp::max(all.count, 1)) + tiny;
-    let trimmed = Axes::of(problem, pose, |x| all.off_line_sq(x) <= reach);
+    let trimmed = Axes::of(problem, pose, Some((&all, reach)));
     let line = if trimmed.count > 4 { trimmed } else { all };
     let focal = (problem.focal[0] + problem.focal[1]) * T::HALF;
     let mut off = 0u32;
@@ -93,11 +93,13 @@ struct Axes<T: Real> {
 }
 
 impl<T: Real> Axes<T> {
+    /// Of the inliers, or of those whose squared distance from a line is no larger than a limit.
     fn of<B: ReprojectionBlock<T>>(
         problem: &PoseProblem<'_, T, B>,
         pose: &CameraPose<T>,
-        counts: impl Fn(&Vector3<T>) -> bool,
+        near: Option<(&Self, T)>,
     ) -> Self {
+        let counts = |x: &Vector3<T>| near.is_none_or(|(line, limit)| line.off_line_sq(x) <= limit);
         let (mut sum, mut count) = (Vector3::zeros(), 0u32);
         problem.for_each_inlier(pose, |x| {
             if counts(&x) {

@@ -44,7 +44,7 @@ impl<'a, T: Real> EpipolarProblem<'a, T> {
     }
 
     /// Squared residuals of a block in units of the squared threshold.
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     pub(super) fn squared(&self, block: &PlaneBlock<T>, f: &Matrix3<T>, scale: T) -> Lanes<T> {
         let (c, d) = block.residual(f);
         let mut squared = [T::ZERO; LANES];
@@ -111,7 +111,7 @@ impl<'a, T: Real> EpipolarProblem<'a, T> {
             if gate.rejects(tally.cost(), tally.inliers(), from_u32(seen)) {
                 counts.residuals += seen as u64;
                 counts.rejected_residuals += seen as u64;
-                counts.rejected_inliers += tally.inliers().to_f64() as u64;
+                counts.rejected_inliers += tally.inliers().to_u32() as u64;
                 return None;
             }
         }

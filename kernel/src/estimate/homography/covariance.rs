@@ -119,7 +119,9 @@ pub(super) fn covariance<T: Real>(
     }
     // Singular where the corners themselves determine no homography.
     Lu::new(&jacobian)?;
-    let covariance = jacobian * inverse * jacobian.transpose() * scale;
+    let half = jacobian * inverse;
+    let mut covariance = half * jacobian.transpose();
+    covariance *= scale;
     crate::real::is_finite(covariance.norm_squared()).then_some(covariance)
 }
 

@@ -65,7 +65,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>, K> AidedProblem<'a, T, B, K> {
         // Two standard deviations more than chance.
         let n = from_u32::<T>(count as u32);
         let chance = n * accident + T::TWO * sqrt(n * accident * (T::ONE - accident));
-        let support = core::cmp::max(chance.to_f64() as u32 + 1, 5);
+        let support = core::cmp::max(chance.to_u32() + 1, 5);
         Some(Self { problem: *problem, known, count, wide, support })
     }
 
@@ -74,7 +74,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>, K> AidedProblem<'a, T, B, K> {
         let blocks = self.problem.data.blocks;
         let full = self.problem.data.count / LANES;
         let mut subset = [B::zero(); SUBSET];
-        let mut at = (abs(model.translation.x) * from_u32(full as u32 * 8)).to_f64() as usize
+        let mut at = (abs(model.translation.x) * from_u32(full as u32 * 8)).to_u32() as usize
             % core::cmp::max(full, 1);
         for place in &mut subset {
             // The stride is coprime to the number of all blocks, the last of which may not be full.
@@ -212,7 +212,7 @@ fn search<T: Real, B: EpipolarBlock<T>>(
     keep_going: Option<&mut dyn FnMut(&Progress) -> bool>,
 ) -> Option<Consensus<PoseModel<T>, T>> {
     let count = problem.data.count as u32;
-    let least = core::cmp::max((LEAST_SHARE * count as f64) as u32, LEAST_INLIERS);
+    let least = core::cmp::max((from_u32::<T>(count) * lit(LEAST_SHARE)).to_u32(), LEAST_INLIERS);
     let mut options = *options;
     let limit = |size: u32| {
         core::cmp::max(iterations_needed(options.confidence, least, count, size), options.min_iterations)
@@ -241,7 +241,9 @@ pub(super) struct Aided<T: Real> {
 }
 
 /// The judgement with a prior: by smaller samples where that finds a consensus that agrees with the prior, otherwise by
-/// the search without it. The prior takes part in the refinement where it fits, and nowhere else.
+/// the search without it. The prior takes part in the refinement where it fits, and nowhere else. Not inlined: without a
+/// prior its variables take no stack.
+#[inline(never)]
 pub(super) fn judgement<T: Real, B: EpipolarBlock<T>>(
     plain: &Judge<'_, '_, T, B>,
     known: &KnownRotation<T>,

@@ -96,7 +96,8 @@ pub(super) fn variance<T: Real, const P: usize>(
 }
 
 /// The 8x8 covariance of `(w, t / d, n)` with `H = Exp(w) R + (t / d) n'`, n in its tangent basis, from the equations
-/// of the homography `model`.
+/// of the homography `model`. Not inlined: its matrices take no stack while the plane is refined.
+#[inline(never)]
 pub(super) fn planar_covariance<T: Real>(
     rotation: &Matrix3<T>,
     t: &Vector3<T>,

@@ -137,7 +137,7 @@ impl<T: Real, B: EpipolarBlock<T>> Evidence<'_, '_, T, B> {
         let mut model = RotationModel { rotation: start.rotation, scales: start.scales };
         let mut limit: T = T::MAX;
         // From coarse to fine, so that a few wrong ones do not hold the rest.
-        for factor in [64.0, 24.0, 12.0, 8.0, 5.0, 5.0] {
+        for factor in [64, 24, 12, 8, 5, 5] {
             let h = model.matrix();
             let mut moment = Matrix3::zeros();
             let mut mask = self.inliers.iter();
@@ -159,7 +159,7 @@ impl<T: Real, B: EpipolarBlock<T>> Evidence<'_, '_, T, B> {
                 }
             }
             model.rotation = nearest_rotation(&moment)?;
-            let factor: T = lit(factor);
+            let factor: T = from_u32(factor);
             limit = factor * factor * self.sigma * self.sigma;
         }
         Some(model)

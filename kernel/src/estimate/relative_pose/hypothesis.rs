@@ -61,7 +61,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
     }
 
     /// Squared residuals of a block in units of the squared threshold.
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     fn squared(&self, block: &B, f: &Matrix3<T>, scale: T) -> Lanes<T> {
         let (c, d) = block.residual(f);
         let mut squared = [T::ZERO; LANES];
@@ -72,7 +72,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
     }
 
     /// Squared residuals of a block in units of the squared threshold; of a point behind a camera, the largest number.
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     fn squared_in_front(&self, block: &B, model: &PoseModel<T>, view: &View<T>) -> Lanes<T> {
         let mut squared = self.squared(block, &view.matrix, view.scale);
         if squared[0] < T::ONE || squared[1] < T::ONE || squared[2] < T::ONE || squared[3] < T::ONE {
@@ -209,7 +209,7 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
             if gate.rejects(tally.cost(), tally.inliers(), from_u32(seen)) {
                 counts.residuals += seen as u64;
                 counts.rejected_residuals += seen as u64;
-                counts.rejected_inliers += tally.inliers().to_f64() as u64;
+                counts.rejected_inliers += tally.inliers().to_u32() as u64;
                 return None;
             }
         }
