@@ -123,7 +123,7 @@ macro_rules! content_of_outputs {
 }
 content_of_outputs!(
     RelativePoseEstimate RefinedRelativePose HomographyEstimate FundamentalEstimate AbsolutePoseEstimate
-    RefinedAbsolutePose TriangulatedPoint RefinedPoint BundleReport PointReport FrameCovariance
+    RefinedAbsolutePose RefinedTwoView TriangulatedPoint RefinedPoint BundleReport PointReport FrameCovariance
 );
 
 /// A window with some content; or memory that is none.
@@ -201,7 +201,8 @@ content_of_options!(
     HomographyOptions estimate homography_options_default max_iterations;
     FundamentalOptions estimate fundamental_options_default max_iterations;
     AbsolutePoseOptions estimate absolute_pose_options_default max_iterations;
-    RefineAbsolutePoseOptions estimate refine_absolute_pose_options_default max_passes;
+    RefineAbsolutePoseOptions refine refine_absolute_pose_options_default max_passes;
+    RefineTwoViewOptions refine refine_two_view_options_default max_passes;
     BundleOptions window bundle_options_default max_iterations;
 );
 
@@ -421,8 +422,7 @@ both! {
     camera call4: camera_project_with_jacobian camera_unproject_with_jacobian;
     camera call5: camera_project camera_unproject;
     estimate call1: homography_workspace_size fundamental_workspace_size;
-    estimate call2: relative_pose_options_default relative_pose_workspace_size homography_options_default fundamental_options_default absolute_pose_options_default absolute_pose_workspace_size refine_absolute_pose_options_default;
-    estimate call8: refine_absolute_pose;
+    estimate call2: relative_pose_options_default relative_pose_workspace_size homography_options_default fundamental_options_default absolute_pose_options_default absolute_pose_workspace_size;
     estimate call9: homography fundamental;
     estimate call10: absolute_pose;
     estimate call11: relative_pose;
@@ -434,6 +434,10 @@ both! {
     geometry call4: essential_from_fundamental essential_to_fundamental homography_motions homography_to_pixels homography_to_normalised;
     geometry call5: homography_transfer in_front_of_both;
     geometry call6: essential_pose_by_cheirality homography_visible_motions;
+    refine call2: refine_absolute_pose_options_default refine_two_view_options_default;
+    refine call3: find_not_finite;
+    refine call7: refine_homography refine_fundamental;
+    refine call8: refine_absolute_pose;
     residual call6: sampson symmetric_epipolar_sq transfer;
     residual call7: symmetric_transfer_sq reprojection reprojection_with_jacobians;
     solvers call3: homography_4pt decompose_projection rotation_2pt;

@@ -1,22 +1,32 @@
 #!/usr/bin/env python3
 """Flash and stack of every function of C on a Cortex-M4F, and the proof that none can panic, from static libraries.
 
-    measure.py [--table] LIBRARY...
+    measure.py [--table | --update | --check] LIBRARY...
 
 Each function is linked alone, with everything that it calls and no more (`--gc-sections`): its text and read-only data are
 the flash. Stack: the longest path of calls, each with what its prologue pushes and reserves; a callback's own stack comes on
-top. With `--table` the table of README.md is printed, from the first library."""
+top.
+With `--table` the table of README.md is printed, from the first library; `--update` writes it there; `--check` fails where a
+figure has grown by more than 2 % and 16 bytes, if the table is of the same compiler."""
 
+import os
 import re
 import subprocess
 import sys
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent / "tests"))
 from header import FUNCTIONS  # noqa: E402
 
 PREFIX = "arm-none-eabi-"
+README = Path(__file__).resolve().parent / "README.md"
+BEGIN, END = "<!-- figures -->", "<!-- end of figures -->"
+HEAD = [
+    "| function | workspace, bytes (`f32`, n correspondences) | flash `f32` | stack `f32` | flash `f64` | stack `f64` |",
+    "|---|---|---|---|---|---|",
+]
 PANIC = re.compile(r"core9panicking|unwrap_failed|expect_failed|rust_begin_unwind|slice_\w*_fail|_fail(?:ed)?\b")
 # What camera firmware links, and its limit in bytes.
 FOUR = ("relative_pose", "homography", "absolute_pose", "triangulate")
@@ -89,9 +99,45 @@ def registers(operands):
     return count
 
 
+def row_of(library, base, functions, stack, elf):
+    """A line of the table: a function's flash and stack, for each scalar."""
+    workspace = WORKSPACES.get(base[4:].removesuffix("_guided"), "the window" if base.startswith("epi_window") else "")
+    row = [f"`{base}`", workspace]
+    for name in (base, base + "_f32", base + "_f64"):
+        if name in functions:
+            row += [str(link(library, [name], elf)[0]), str(stack[name])]
+    return row + [""] * (6 - len(row))
+
+
+def split(readme):
+    """What stands before the table, its lines, and what follows."""
+    before, marker, rest = readme.partition(BEGIN)
+    table, end, after = rest.partition(END)
+    assert marker and end, "the table's markers are gone"
+    return before + marker, table.strip().splitlines(), end + after
+
+
+def grown(old, new):
+    """The figures that have grown, and how many were compared."""
+    figures = {row[0]: row[2:] for row in (re.split(r" *\| *", line)[1:-1] for line in old)}
+    growth, compared = [], 0
+    for row in new:
+        committed = figures.get(row[0])
+        if committed is None:
+            growth.append(f"{row[0]} is not in the table")
+            continue
+        for before, now in zip(committed, row[2:]):
+            if now:
+                compared += 1
+                if not before or int(now) > 1.02 * int(before) + 16:
+                    growth.append(f"{row[0]}: {before} -> {now}")
+    return growth, compared
+
+
 def main():
-    table = "--table" in sys.argv
-    libraries = [argument for argument in sys.argv[1:] if argument != "--table"]
+    mode = next((argument for argument in sys.argv[1:] if argument.startswith("--")), None)
+    assert mode in (None, "--table", "--update", "--check"), f"what is {mode}?"
+    libraries = [argument for argument in sys.argv[1:] if not argument.startswith("--")]
     defined = run("nm", "-g", "--defined-only", libraries[0])
     functions = [name for name in FUNCTIONS if re.search(rf" T {name}$", defined, flags=re.M)]
     with tempfile.TemporaryDirectory() as folder:
@@ -108,21 +154,27 @@ def main():
         stack = stacks(elf)
         four = link(libraries[0], [f"epi_{name}_f32" for name in FOUR], elf)[0]
         print(f"{', '.join(FOUR)} in f32: {four} bytes", file=sys.stderr)
-        if not table:
+        if mode is None:
             return
-        print("| function | workspace, bytes (`f32`, n correspondences) | flash `f32` | stack `f32` | flash `f64` | stack `f64` |")
-        print("|---|---|---|---|---|---|")
-        for name in functions:
-            if name.endswith("_f64"):
-                continue
-            base = name.removesuffix("_f32")
-            row = [f"`{base}`", WORKSPACES.get(base[4:].removesuffix("_guided"), "")]
-            if base.startswith("epi_window"):
-                row[1] = "the window"
-            for scalar in ("_f32", "_f64") if name.endswith("_f32") else ("",):
-                if base + scalar in functions:
-                    row += [str(link(libraries[0], [base + scalar], elf)[0]), str(stack[base + scalar])]
-            print("| " + " | ".join(row + [""] * (6 - len(row))) + " |")
+        bases = dict.fromkeys(re.sub("_f(32|64)$", "", name) for name in functions)
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            rows = list(pool.map(lambda base: row_of(libraries[0], base, functions, stack, f"{folder}/{base}"), bases))
+    compiler = subprocess.run(["rustc", "--version"], check=True, capture_output=True, text=True).stdout.strip()
+    lines = [f"By {compiler}; camera firmware ({', '.join(FOUR)}) in `f32`: {four} bytes.", "", *HEAD]
+    lines += ["| " + " | ".join(row) + " |" for row in rows]
+    if mode == "--table":
+        print("\n".join(lines))
+        return
+    before, old, after = split(README.read_text())
+    if mode == "--update":
+        README.write_text("\n".join([before, "", *lines, "", after]).replace("-->\n\n\n", "-->\n\n"))
+        return
+    growth, compared = grown(old[4:], rows)
+    same = compiler in old[0]
+    print("\n".join(growth + [f"{compared} figures compared, {len(growth)} grown"]))
+    if not same:
+        print("SKIPPED: the table belongs to another compiler, and nothing is judged")
+    sys.exit(bool(same and growth))
 
 
 if __name__ == "__main__":

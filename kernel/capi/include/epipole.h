@@ -596,6 +596,10 @@ typedef struct epi_relative_pose_options_f32 {
     float max_error_px;
     // Standard deviation of the noise of one image coordinate, pixels; 0 for half of `max_error_px`.
     float sigma_px;
+    // Displacement between the views, pixels, that is no motion where at least half of all correspondences stay below it
+    // and at most one inlier in ten moves by twice as much; 0 leaves the decision to the noise alone, and a negative number
+    // stands for five times `sigma_px`.
+    float least_motion_px;
     // Of gravity as a prior: its direction in view 1, of any length.
     float prior_view1[3];
     // Its direction in view 2.
@@ -856,6 +860,32 @@ typedef struct epi_refined_absolute_pose_f32 {
     uint32_t passes;
 } epi_refined_absolute_pose_f32;
 
+// Options of `epi_refine_homography` and `epi_refine_fundamental`.
+typedef struct epi_refine_two_view_options_f32 {
+    // Of this struct, in bytes.
+    uint32_t size;
+    // Passes over the correspondences at the most.
+    uint32_t max_passes;
+    // Of the error: one of `epi_loss`.
+    uint32_t loss;
+    // Scale of the loss, pixels.
+    float loss_scale;
+} epi_refine_two_view_options_f32;
+
+// What `epi_refine_homography` and `epi_refine_fundamental` found.
+typedef struct epi_refined_two_view_f32 {
+    // 3x3 by rows, of length 1; the start where nothing could be improved.
+    float matrix[3][3];
+    // Sum of the losses, px^2.
+    float cost;
+    // The cost at the start.
+    float initial_cost;
+    // How many correspondences have a weight above zero.
+    uint32_t active;
+    // Passes over the correspondences.
+    uint32_t passes;
+} epi_refined_two_view_f32;
+
 // What the rays of views determine.
 typedef struct epi_triangulated_point_f32 {
     // By the verdict a point, a unit direction, or zeros.
@@ -988,6 +1018,10 @@ typedef struct epi_relative_pose_options_f64 {
     double max_error_px;
     // Standard deviation of the noise of one image coordinate, pixels; 0 for half of `max_error_px`.
     double sigma_px;
+    // Displacement between the views, pixels, that is no motion where at least half of all correspondences stay below it
+    // and at most one inlier in ten moves by twice as much; 0 leaves the decision to the noise alone, and a negative number
+    // stands for five times `sigma_px`.
+    double least_motion_px;
     // Of gravity as a prior: its direction in view 1, of any length.
     double prior_view1[3];
     // Its direction in view 2.
@@ -1243,6 +1277,32 @@ typedef struct epi_refined_absolute_pose_f64 {
     // Passes over the correspondences.
     uint32_t passes;
 } epi_refined_absolute_pose_f64;
+
+// Options of `epi_refine_homography` and `epi_refine_fundamental`.
+typedef struct epi_refine_two_view_options_f64 {
+    // Of this struct, in bytes.
+    uint32_t size;
+    // Passes over the correspondences at the most.
+    uint32_t max_passes;
+    // Of the error: one of `epi_loss`.
+    uint32_t loss;
+    // Scale of the loss, pixels.
+    double loss_scale;
+} epi_refine_two_view_options_f64;
+
+// What `epi_refine_homography` and `epi_refine_fundamental` found.
+typedef struct epi_refined_two_view_f64 {
+    // 3x3 by rows, of length 1; the start where nothing could be improved.
+    double matrix[3][3];
+    // Sum of the losses, px^2.
+    double cost;
+    // The cost at the start.
+    double initial_cost;
+    // How many correspondences have a weight above zero.
+    uint32_t active;
+    // Passes over the correspondences.
+    uint32_t passes;
+} epi_refined_two_view_f64;
 
 // What the rays of views determine.
 typedef struct epi_triangulated_point_f64 {
@@ -1571,23 +1631,6 @@ int32_t epi_refine_relative_pose_f32(const struct epi_camera_f32 *camera1,
                                      size_t refined_size,
                                      uint8_t *inliers);
 
-// Fills the options of `epi_refine_absolute_pose` with their defaults. `size`: `sizeof` of the struct.
-int32_t epi_refine_absolute_pose_options_default_f32(struct epi_refine_absolute_pose_options_f32 *options,
-                                                     size_t size);
-
-// The pose, world to camera, of least robust reprojection error in the distorted image, from a start.
-//
-// `pixels`: `count` times u v, at least 3, with a prior any number. `points`: `count` times x y z. `refined_size`:
-// `sizeof` of the struct. Answers 1.
-int32_t epi_refine_absolute_pose_f32(const struct epi_camera_f32 *camera,
-                                     const float *pixels,
-                                     const float *points,
-                                     size_t count,
-                                     const struct epi_pose_f32 *start,
-                                     const struct epi_refine_absolute_pose_options_f32 *options,
-                                     struct epi_refined_absolute_pose_f32 *refined,
-                                     size_t refined_size);
-
 // The pose of a rotation matrix, which is checked, and a translation.
 int32_t epi_pose_from_matrix_f32(const float *matrix, const float *translation, struct epi_pose_f32 *pose);
 
@@ -1717,6 +1760,60 @@ int32_t epi_in_front_of_both_f32(const struct epi_pose_f32 *pose,
                                  const float *x2,
                                  size_t count,
                                  uint8_t *in_front);
+
+// Fills the options of `epi_refine_absolute_pose` with their defaults. `size`: `sizeof` of the struct.
+int32_t epi_refine_absolute_pose_options_default_f32(struct epi_refine_absolute_pose_options_f32 *options,
+                                                     size_t size);
+
+// The pose, world to camera, of least robust reprojection error in the distorted image, from a start.
+//
+// `pixels`: `count` times u v, at least 3, with a prior any number. `points`: `count` times x y z. `refined_size`:
+// `sizeof` of the struct. Answers 1.
+int32_t epi_refine_absolute_pose_f32(const struct epi_camera_f32 *camera,
+                                     const float *pixels,
+                                     const float *points,
+                                     size_t count,
+                                     const struct epi_pose_f32 *start,
+                                     const struct epi_refine_absolute_pose_options_f32 *options,
+                                     struct epi_refined_absolute_pose_f32 *refined,
+                                     size_t refined_size);
+
+// Fills the options of `epi_refine_homography` and `epi_refine_fundamental` with their defaults. `size`: `sizeof` of the
+// struct.
+int32_t epi_refine_two_view_options_default_f32(struct epi_refine_two_view_options_f32 *options,
+                                                size_t size);
+
+// The homography `x2 ~ H x1` of least robust error near a start.
+//
+// `x1`, `x2`: `count >= 4` times u v. `start`: 3x3 by rows. `refined_size`: `sizeof` of the struct. Answers 1, or 0 where
+// the start is singular.
+int32_t epi_refine_homography_f32(const float *x1,
+                                  const float *x2,
+                                  size_t count,
+                                  const float *start,
+                                  const struct epi_refine_two_view_options_f32 *options,
+                                  struct epi_refined_two_view_f32 *refined,
+                                  size_t refined_size);
+
+// The fundamental matrix `x2' F x1 = 0` of rank 2 and of least robust Sampson error near a start.
+//
+// `x1`, `x2`: `count >= 7` times u v. `start`: 3x3 by rows. `refined_size`: `sizeof` of the struct. Answers 1, or 0 where
+// no matrix of rank 2 is nearest to the start.
+int32_t epi_refine_fundamental_f32(const float *x1,
+                                   const float *x2,
+                                   size_t count,
+                                   const float *start,
+                                   const struct epi_refine_two_view_options_f32 *options,
+                                   struct epi_refined_two_view_f32 *refined,
+                                   size_t refined_size);
+
+// After `EPI_STATUS_NOT_FINITE`: which number of an array it is.
+//
+// `numbers`: `count` of them. `index`: of the first that is NaN or infinite; divided by the numbers a point, that of the
+// point. Answers 1, or 0 where all are finite; then nothing is written.
+int32_t epi_find_not_finite_f32(const float *numbers,
+                                size_t count,
+                                uint32_t *index);
 
 // Sampson errors, signed: `x2' M x1` over the length of its gradient, in the unit of the points.
 //
@@ -2389,23 +2486,6 @@ int32_t epi_refine_relative_pose_f64(const struct epi_camera_f64 *camera1,
                                      size_t refined_size,
                                      uint8_t *inliers);
 
-// Fills the options of `epi_refine_absolute_pose` with their defaults. `size`: `sizeof` of the struct.
-int32_t epi_refine_absolute_pose_options_default_f64(struct epi_refine_absolute_pose_options_f64 *options,
-                                                     size_t size);
-
-// The pose, world to camera, of least robust reprojection error in the distorted image, from a start.
-//
-// `pixels`: `count` times u v, at least 3, with a prior any number. `points`: `count` times x y z. `refined_size`:
-// `sizeof` of the struct. Answers 1.
-int32_t epi_refine_absolute_pose_f64(const struct epi_camera_f64 *camera,
-                                     const double *pixels,
-                                     const double *points,
-                                     size_t count,
-                                     const struct epi_pose_f64 *start,
-                                     const struct epi_refine_absolute_pose_options_f64 *options,
-                                     struct epi_refined_absolute_pose_f64 *refined,
-                                     size_t refined_size);
-
 // The pose of a rotation matrix, which is checked, and a translation.
 int32_t epi_pose_from_matrix_f64(const double *matrix, const double *translation, struct epi_pose_f64 *pose);
 
@@ -2535,6 +2615,60 @@ int32_t epi_in_front_of_both_f64(const struct epi_pose_f64 *pose,
                                  const double *x2,
                                  size_t count,
                                  uint8_t *in_front);
+
+// Fills the options of `epi_refine_absolute_pose` with their defaults. `size`: `sizeof` of the struct.
+int32_t epi_refine_absolute_pose_options_default_f64(struct epi_refine_absolute_pose_options_f64 *options,
+                                                     size_t size);
+
+// The pose, world to camera, of least robust reprojection error in the distorted image, from a start.
+//
+// `pixels`: `count` times u v, at least 3, with a prior any number. `points`: `count` times x y z. `refined_size`:
+// `sizeof` of the struct. Answers 1.
+int32_t epi_refine_absolute_pose_f64(const struct epi_camera_f64 *camera,
+                                     const double *pixels,
+                                     const double *points,
+                                     size_t count,
+                                     const struct epi_pose_f64 *start,
+                                     const struct epi_refine_absolute_pose_options_f64 *options,
+                                     struct epi_refined_absolute_pose_f64 *refined,
+                                     size_t refined_size);
+
+// Fills the options of `epi_refine_homography` and `epi_refine_fundamental` with their defaults. `size`: `sizeof` of the
+// struct.
+int32_t epi_refine_two_view_options_default_f64(struct epi_refine_two_view_options_f64 *options,
+                                                size_t size);
+
+// The homography `x2 ~ H x1` of least robust error near a start.
+//
+// `x1`, `x2`: `count >= 4` times u v. `start`: 3x3 by rows. `refined_size`: `sizeof` of the struct. Answers 1, or 0 where
+// the start is singular.
+int32_t epi_refine_homography_f64(const double *x1,
+                                  const double *x2,
+                                  size_t count,
+                                  const double *start,
+                                  const struct epi_refine_two_view_options_f64 *options,
+                                  struct epi_refined_two_view_f64 *refined,
+                                  size_t refined_size);
+
+// The fundamental matrix `x2' F x1 = 0` of rank 2 and of least robust Sampson error near a start.
+//
+// `x1`, `x2`: `count >= 7` times u v. `start`: 3x3 by rows. `refined_size`: `sizeof` of the struct. Answers 1, or 0 where
+// no matrix of rank 2 is nearest to the start.
+int32_t epi_refine_fundamental_f64(const double *x1,
+                                   const double *x2,
+                                   size_t count,
+                                   const double *start,
+                                   const struct epi_refine_two_view_options_f64 *options,
+                                   struct epi_refined_two_view_f64 *refined,
+                                   size_t refined_size);
+
+// After `EPI_STATUS_NOT_FINITE`: which number of an array it is.
+//
+// `numbers`: `count` of them. `index`: of the first that is NaN or infinite; divided by the numbers a point, that of the
+// point. Answers 1, or 0 where all are finite; then nothing is written.
+int32_t epi_find_not_finite_f64(const double *numbers,
+                                size_t count,
+                                uint32_t *index);
 
 // Sampson errors, signed: `x2' M x1` over the length of its gradient, in the unit of the points.
 //

@@ -2,7 +2,7 @@
 
 use epipole::Real;
 use epipole::nalgebra::SMatrix;
-use epipole::{estimate, refine};
+use epipole::{estimate, geometry, refine};
 
 use crate::enums;
 use crate::raw::Grows;
@@ -131,6 +131,22 @@ pub struct RefinedAbsolutePose<T> {
     /// 1 where there is a covariance, 0 where a direction is open.
     pub has_covariance: u32,
     /// Points that the camera sees with a weight above zero.
+    pub active: u32,
+    /// Passes over the correspondences.
+    pub passes: u32,
+}
+
+/// What `epi_refine_homography` and `epi_refine_fundamental` found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct RefinedTwoView<T> {
+    /// 3x3 by rows, of length 1; the start where nothing could be improved.
+    pub matrix: [[T; 3]; 3],
+    /// Sum of the losses, px^2.
+    pub cost: T,
+    /// The cost at the start.
+    pub initial_cost: T,
+    /// How many correspondences have a weight above zero.
     pub active: u32,
     /// Passes over the correspondences.
     pub passes: u32,
@@ -348,6 +364,23 @@ impl<T: Real> From<&refine::RefinedAbsolutePose<T>> for RefinedAbsolutePose<T> {
         }
     }
 }
+
+// SAFETY: plain numbers.
+unsafe impl<T: Real> Grows for RefinedTwoView<T> {
+    const FIRST: usize = size_of::<Self>();
+}
+
+macro_rules! from_refined {
+    ($($model:ident)*) => {$(
+        impl<T: Real> From<refine::RefinedTwoView<geometry::$model<T>, T>> for RefinedTwoView<T> {
+            fn from(kernel: refine::RefinedTwoView<geometry::$model<T>, T>) -> Self {
+                let refine::RefinedTwoView { model, cost, initial_cost, active, passes } = kernel;
+                Self { matrix: rows(&model.0), cost, initial_cost, active, passes }
+            }
+        }
+    )*};
+}
+from_refined!(Homography Fundamental);
 
 /// One of `epi_unobservable`.
 fn reason(why: estimate::Unobservable) -> u32 {

@@ -15,7 +15,9 @@ macro_rules! sizes {
 #[cfg(not(target_arch = "x86"))]
 sizes! {
     Camera: 52 104;
-    RelativePoseOptions: 128 224;
+    RelativePoseOptions: 136 232;
+    RefineTwoViewOptions: 16 24;
+    RefinedTwoView: 52 96;
     SearchReport: 48 56;
     Pose: 28 56;
     RelativePoseEstimate: 680 1296;

@@ -52,6 +52,7 @@ pub mod f32 {
     pub mod camera;
     pub mod estimate;
     pub mod geometry;
+    pub mod refine;
     pub mod residual;
     pub mod solvers;
     pub mod triangulation;
@@ -72,6 +73,7 @@ pub mod f64 {
     pub mod camera;
     pub mod estimate;
     pub mod geometry;
+    pub mod refine;
     pub mod residual;
     pub mod solvers;
     pub mod triangulation;

@@ -32,6 +32,10 @@ pub struct RelativePoseOptions<T> {
     pub max_error_px: T,
     /// Standard deviation of the noise of one image coordinate, pixels; 0 for half of `max_error_px`.
     pub sigma_px: T,
+    /// Displacement between the views, pixels, that is no motion where at least half of all correspondences stay below it
+    /// and at most one inlier in ten moves by twice as much; 0 leaves the decision to the noise alone, and a negative number
+    /// stands for five times `sigma_px`.
+    pub least_motion_px: T,
     /// Of gravity as a prior: its direction in view 1, of any length.
     pub prior_view1: [T; 3],
     /// Its direction in view 2.
@@ -148,6 +152,20 @@ pub struct RefineAbsolutePoseOptions<T> {
     pub prior_information: [[T; 6]; 6],
 }
 
+/// Options of `epi_refine_homography` and `epi_refine_fundamental`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct RefineTwoViewOptions<T> {
+    /// Of this struct, in bytes.
+    pub size: u32,
+    /// Passes over the correspondences at the most.
+    pub max_passes: u32,
+    /// Of the error: one of `epi_loss`.
+    pub loss: u32,
+    /// Scale of the loss, pixels.
+    pub loss_scale: T,
+}
+
 // SAFETY: plain numbers that begin with the size.
 unsafe impl<T: Real> Grows for RelativePoseOptions<T> {
     const FIRST: usize = size_of::<Self>();
@@ -216,6 +234,7 @@ macro_rules! search_options {
 
 search_options!(
     RelativePoseOptions,
+    least_motion_px: -T::ONE,
     prior_view1: [T::ZERO; 3],
     prior_view2: [T::ZERO; 3],
     prior_sigma_rad: T::ZERO,
@@ -239,6 +258,12 @@ impl<T: Real> RelativePoseOptions<T> {
         const GRAVITY: u32 = enums::RelativePosePrior::Gravity as u32;
         const ROTATION: u32 = enums::RelativePosePrior::Rotation as u32;
         let mut kernel = self.search();
+        // Below 0 stands for the default.
+        kernel.least_motion_px = match self.least_motion_px {
+            motion if motion < T::ZERO => None,
+            motion if motion <= T::MAX => Some(motion),
+            _ => return Err(Status::NotFinite),
+        };
         kernel.prior = match self.prior {
             NONE => None,
             GRAVITY => Some(estimate::RelativePosePrior::Gravity {
@@ -313,6 +338,28 @@ impl<T: Real> RefineAbsolutePoseOptions<T> {
             }
             false => None,
         };
+        Ok(kernel)
+    }
+}
+
+// SAFETY: plain numbers that begin with the size.
+unsafe impl<T: Real> Grows for RefineTwoViewOptions<T> {
+    const FIRST: usize = size_of::<Self>();
+}
+
+impl<T: Real> Defaults for RefineTwoViewOptions<T> {
+    fn defaults(size: usize) -> Self {
+        let kernel = refine::RefineTwoViewOptions::<T>::default();
+        let (loss, loss_scale) = loss_parts(kernel.loss);
+        Self { size: size as u32, max_passes: kernel.max_passes, loss, loss_scale }
+    }
+}
+
+impl<T: Real> RefineTwoViewOptions<T> {
+    pub(crate) fn to_kernel(self) -> Result<refine::RefineTwoViewOptions<T>, Status> {
+        let mut kernel = refine::RefineTwoViewOptions::default();
+        kernel.max_passes = self.max_passes;
+        kernel.loss = loss(self.loss, self.loss_scale)?;
         Ok(kernel)
     }
 }

@@ -185,21 +185,35 @@ impl<T: Real> Camera<T> {
     }
 }
 
+/// A method of the camera's model; none of a fisheye in a library without them.
+macro_rules! through {
+    ($lens:ident, $method:ident($argument:ident)) => {
+        match &$lens.0 {
+            geometry::Camera::Pinhole(camera) => Some(camera.$method($argument)),
+            geometry::Camera::BrownConrady(camera) => Some(camera.$method($argument)),
+            geometry::Camera::KannalaBrandt(camera) if cfg!(feature = "fisheye") => {
+                Some(camera.$method($argument))
+            }
+            _ => None,
+        }
+    };
+}
+
 impl<T: Real> CameraModel<T> for Lens<T> {
     fn project(&self, point: &Vector3<T>) -> Option<Vector2<T>> {
-        self.0.project(point)
+        through!(self, project(point)).unwrap_or_default()
     }
     fn project_with_jacobian(&self, point: &Vector3<T>) -> Option<(Vector2<T>, Matrix2x3<T>)> {
-        self.0.project_with_jacobian(point)
+        through!(self, project_with_jacobian(point)).unwrap_or_default()
     }
     fn unproject(&self, pixel: &Vector2<T>) -> Result<Vector3<T>, UnprojectError> {
-        self.0.unproject(pixel)
+        through!(self, unproject(pixel)).unwrap_or(Err(UnprojectError::OutsideDomain))
     }
     fn unproject_with_jacobian(
         &self,
         pixel: &Vector2<T>,
     ) -> Result<(Vector3<T>, Matrix3x2<T>), UnprojectError> {
-        self.0.unproject_with_jacobian(pixel)
+        through!(self, unproject_with_jacobian(pixel)).unwrap_or(Err(UnprojectError::OutsideDomain))
     }
     fn focal(&self) -> T {
         self.0.focal()

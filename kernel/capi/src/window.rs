@@ -11,11 +11,11 @@ use epipole::bundle::{
     scalars_len, system_len,
 };
 
-use crate::Status;
 use crate::enums;
 use crate::options::{Defaults, loss, loss_parts};
 use crate::raw::{Bytes, Grows, Plain};
 use crate::workspace::WORKSPACE_ALIGN;
+use crate::{ABI_VERSION, Status};
 
 /// Bytes of a window's head.
 pub const WINDOW_HEAD: usize = 48;
@@ -56,6 +56,7 @@ trait Sizes: Real + Plain {
     const FRAME: usize;
     const POINT: usize;
     const OBSERVATION: usize;
+    /// Tells a window's memory from any other, and from that of another ABI or another layout of the slots.
     const MAGIC: u32;
 }
 
@@ -63,14 +64,30 @@ impl Sizes for f32 {
     const FRAME: usize = WINDOW_FRAME_F32;
     const POINT: usize = WINDOW_POINT_F32;
     const OBSERVATION: usize = WINDOW_OBSERVATION_F32;
-    const MAGIC: u32 = 0x4550_4932;
+    const MAGIC: u32 = magic::<Self>(0x4550_4932);
 }
 
 impl Sizes for f64 {
     const FRAME: usize = WINDOW_FRAME_F64;
     const POINT: usize = WINDOW_POINT_F64;
     const OBSERVATION: usize = WINDOW_OBSERVATION_F64;
-    const MAGIC: u32 = 0x4550_4934;
+    const MAGIC: u32 = magic::<Self>(0x4550_4934);
+}
+
+const fn magic<T: Real>(name: u32) -> u32 {
+    let slots = [
+        size_of::<Head>(),
+        size_of::<FrameSlot<T>>(),
+        size_of::<PointSlot<T>>(),
+        size_of::<ObservationSlot<T>>(),
+    ];
+    let mut mixed = name ^ ABI_VERSION;
+    let mut k = 0;
+    while k < slots.len() {
+        mixed = mixed.rotate_left(7).wrapping_mul(0x9e37_79b9) ^ slots[k] as u32;
+        k += 1;
+    }
+    mixed
 }
 
 /// The macros of the header say on every target what the kernel needs.

@@ -28,7 +28,7 @@ fn the_committed_asserts_are_those_of_rust() {
     );
     layout!(out;
         Camera "camera": model fx fy cx cy distortion;
-        RelativePoseOptions "relative_pose_options": size min_iterations max_iterations max_solver_calls max_residuals seed confidence max_error_px sigma_px prior_view1 prior_view2 prior_sigma_rad prior_rotation prior_covariance prior;
+        RelativePoseOptions "relative_pose_options": size min_iterations max_iterations max_solver_calls max_residuals seed confidence max_error_px sigma_px least_motion_px prior_view1 prior_view2 prior_sigma_rad prior_rotation prior_covariance prior;
         SearchReport "search_report": residuals iterations solver_calls hypotheses refinements stop inliers cost miss_probability excluded_inlier_ratio;
         Pose "pose": rotation translation;
         RelativePoseEstimate "relative_pose_estimate": report verdict unobservable pose_count prior covariance_size noise_px prior_deviations poses normals baseline_over_distance covariance;
@@ -39,6 +39,8 @@ fn the_committed_asserts_are_those_of_rust() {
         AbsolutePoseOptions "absolute_pose_options": size min_iterations max_iterations max_solver_calls max_residuals seed confidence max_error_px sigma_px gravity_world gravity_camera gravity_sigma_rad has_gravity;
         AbsolutePoseEstimate "absolute_pose_estimate": report verdict unobservable pose_count gravity has_covariance noise_px gravity_deviations rms_px poses covariance;
         RefinedRelativePose "refined_relative_pose": pose covariance has_covariance;
+        RefineTwoViewOptions "refine_two_view_options": size max_passes loss loss_scale;
+        RefinedTwoView "refined_two_view": matrix cost initial_cost active passes;
         RefineAbsolutePoseOptions "refine_absolute_pose_options": size max_passes loss has_prior loss_scale sigma_px prior_pose prior_information;
         RefinedAbsolutePose "refined_absolute_pose": pose covariance cost initial_cost has_covariance active passes;
         TriangulatedPoint "triangulated_point": point verdict view behind;

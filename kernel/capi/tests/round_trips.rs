@@ -14,7 +14,7 @@ use epipole::robust::loss::Loss;
 use epipole::{Real, refine, solvers};
 use epipole_capi::enums::{PriorFit, RelativePosePrior, RelativePoseVerdict, TriangulationMethod};
 use epipole_capi::types::{Camera, Pose};
-use epipole_capi::{estimates as out, options as opt, window as win};
+use epipole_capi::{Status, estimates as out, options as opt, window as win};
 
 /// The numbers of a value, by rows.
 trait Numbers<T: Real> {
@@ -98,7 +98,8 @@ macro_rules! round_trips {
         mod $S {
             use super::*;
             use epipole_capi::$S::{
-                camera::*, estimate::*, geometry::*, residual::*, solvers::*, triangulation::*, window::*,
+                camera::*, estimate::*, geometry::*, refine::*, residual::*, solvers::*, triangulation::*,
+                window::*,
             };
 
             type S = $S;
@@ -569,6 +570,16 @@ macro_rules! round_trips {
                     );
 
                     o.prior = RelativePosePrior::None as u32;
+                    // No motion is larger than this.
+                    o.least_motion_px = 1e4;
+                    let found =
+                        relative_pose(&c, &c, flat(&u1), flat(&u2), 60, &o, room, size, &mut e, e_size, m);
+                    assert_eq!((found, e.verdict), (0, RelativePoseVerdict::NoMotion as u32));
+                    o.least_motion_px = S::NAN;
+                    let found =
+                        relative_pose(&c, &c, flat(&u1), flat(&u2), 60, &o, room, size, &mut e, e_size, m);
+                    assert_eq!(found, Status::NotFinite as i32);
+                    o.least_motion_px = -1.0;
                     let start = pose_of(&pose);
                     let mut refined = zero!(out::RefinedRelativePose<S>);
                     let mut w = storage.workspace();
@@ -675,6 +686,46 @@ macro_rules! round_trips {
                         1
                     );
                     assert_eq!(e.homography.concat(), want.homography().unwrap().0.numbers());
+
+                    let mut o = options!(RefineTwoViewOptions, refine_two_view_options_default);
+                    let mut kernel = refine::RefineTwoViewOptions::default();
+                    kernel.loss = Loss::Cauchy(1.5);
+                    (o.loss, o.loss_scale) = (Loss_::Cauchy as u32, 1.5);
+                    let mut r = zero!(out::RefinedTwoView<S>);
+                    let r_size = size_of_val(&r);
+                    let rough = Homography(h.0 * 1.001);
+                    let want = refine::homography(&u1, &v2, &rough, &kernel).unwrap().unwrap();
+                    let numbers = rough.0.numbers();
+                    let begin = numbers.as_ptr();
+                    assert_eq!(refine_homography(flat(&u1), flat(&v2), 60, begin, &o, &mut r, r_size), 1);
+                    assert_eq!(r.matrix.concat(), want.model.0.numbers());
+                    assert_eq!(
+                        (r.cost, r.initial_cost, r.active, r.passes),
+                        (want.cost, want.initial_cost, want.active, want.passes)
+                    );
+                    let rough =
+                        estimate::fundamental(&u1, &u2, &Default::default(), &mut storage.workspace())
+                            .unwrap()
+                            .fundamental()
+                            .unwrap();
+                    let want = refine::fundamental(&u1, &u2, &rough, &kernel).unwrap().unwrap();
+                    let numbers = rough.0.numbers();
+                    let begin = numbers.as_ptr();
+                    assert_eq!(refine_fundamental(flat(&u1), flat(&u2), 60, begin, &o, &mut r, r_size), 1);
+                    assert_eq!((r.matrix.concat(), r.cost), (want.model.0.numbers(), want.cost));
+                    let zeros = [0.0; 9];
+                    assert_eq!(
+                        refine_fundamental(flat(&u1), flat(&u2), 60, zeros.as_ptr(), &o, &mut r, r_size),
+                        0
+                    );
+                    let (mut wrong, mut index) = (u1.clone(), 7);
+                    assert_eq!(find_not_finite(flat(&wrong), 120, &mut index), 0);
+                    wrong[31].y = S::INFINITY;
+                    assert_eq!(
+                        refine_fundamental(flat(&wrong), flat(&u2), 60, begin, &o, &mut r, r_size),
+                        Status::NotFinite as i32
+                    );
+                    assert_eq!((find_not_finite(flat(&wrong), 120, &mut index), index / 2), (1, 31));
 
                     let mut o = options!(AbsolutePoseOptions, absolute_pose_options_default);
                     let mut e = zero!(out::AbsolutePoseEstimate<S>);
@@ -954,7 +1005,7 @@ round_trips!(f64);
 
 #[test]
 fn statuses_have_sentences() {
-    for status in epipole_capi::Status::ALL {
+    for status in Status::ALL {
         // SAFETY: a static string.
         let text = unsafe { std::ffi::CStr::from_ptr(epipole_capi::status_string(status as i32)) };
         assert!(!text.is_empty());

@@ -1,11 +1,12 @@
-//! From pixels and cameras to a verdict, robustly; and the refinement of a pose that is known roughly.
+//! From pixels and cameras to a verdict, robustly; and a relative pose refined with its covariance. Long because the
+//! arguments of a C function are many.
 
 use core::ffi::c_void;
 
 use epipole::estimate::{self, AbsolutePoseWorkspace, TwoViewWorkspace};
 use epipole::geometry::CameraModel;
 use epipole::nalgebra::{Vector2, Vector3};
-use epipole::{refine, robust};
+use epipole::robust;
 
 use super::Scalar;
 use crate::Status;
@@ -21,7 +22,7 @@ type Pixel = Vector2<Scalar>;
 
 /// # Safety
 /// As of [`OutputStruct::new`].
-unsafe fn write_defaults<O: Defaults>(options: *mut O, size: usize) -> Result<usize, Status> {
+pub(super) unsafe fn write_defaults<O: Defaults>(options: *mut O, size: usize) -> Result<usize, Status> {
     // SAFETY: passed on.
     let mut output = unsafe { OutputStruct::new(options, size)? };
     output.write(&O::defaults(size));
@@ -593,58 +594,5 @@ pub unsafe extern "C" fn refine_relative_pose(
         }
         lent.inliers.write(workspace.inliers().iter().map(|&inlier| u8::from(inlier)));
         Ok(usize::from(found.is_some()))
-    })
-}
-
-/// Fills the options of `epi_refine_absolute_pose` with their defaults. `size`: `sizeof` of the struct.
-///
-/// # Safety
-/// See the crate.
-#[unsafe(export_name = name!("refine_absolute_pose_options_default"))]
-pub unsafe extern "C" fn refine_absolute_pose_options_default(
-    options: *mut RefineAbsolutePoseOptions<Scalar>,
-    size: usize,
-) -> i32 {
-    // SAFETY: passed on.
-    answer(|| unsafe { write_defaults(options, size) })
-}
-
-/// The pose, world to camera, of least robust reprojection error in the distorted image, from a start.
-///
-/// `pixels`: `count` times u v, at least 3, with a prior any number. `points`: `count` times x y z. `refined_size`:
-/// `sizeof` of the struct. Answers 1.
-///
-/// # Safety
-/// See the crate.
-#[unsafe(export_name = name!("refine_absolute_pose"))]
-pub unsafe extern "C" fn refine_absolute_pose(
-    camera: *const Camera<Scalar>,
-    pixels: *const Scalar,
-    points: *const Scalar,
-    count: usize,
-    start: *const Pose<Scalar>,
-    options: *const RefineAbsolutePoseOptions<Scalar>,
-    refined: *mut RefinedAbsolutePose<Scalar>,
-    refined_size: usize,
-) -> i32 {
-    answer(|| {
-        // SAFETY: the caller's promise.
-        let (camera, pixels, points, start, (options, options_bytes), mut refined) = unsafe {
-            (
-                Input::<Camera<Scalar>>::new(camera, 1)?,
-                Input::<Pixel>::new(pixels, count)?,
-                Input::<Vector3<Scalar>>::new(points, count)?,
-                Input::<Pose<Scalar>>::new(start, 1)?,
-                read_options(options, Defaults::defaults(size_of::<RefineAbsolutePoseOptions<Scalar>>()))?,
-                OutputStruct::new(refined, refined_size)?,
-            )
-        };
-        let inputs = [camera.bytes(), pixels.bytes(), points.bytes(), start.bytes(), options_bytes];
-        disjoint(&inputs, &[refined.bytes()])?;
-        let options = options.to_kernel()?;
-        let (camera, start) = (camera.value()?.to_lens()?, start.value()?.to_kernel()?);
-        let found = refine::absolute_pose(&camera, pixels.slice, points.slice, &start, &options)?;
-        refined.write(&RefinedAbsolutePose::from(&found));
-        Ok(1)
     })
 }
