@@ -34,9 +34,9 @@
 //! 8 frames, 100 points, 681 observations in `f32` take 23,856 bytes for everything one optimisation needs, 28,752 with
 //! the prior (4,896 more; the test `memory_is_as_published`). A frame takes 516 bytes, a point 28, an observation 16.
 //!
-//! On a window of that size with 685 observations, two frames fixed, an iteration takes 1.05 million instructions with a
-//! new system and 0.56 million with a kept one, 0.79 million on average over the first five (x86-64, callgrind, `-C
-//! no-vectorize-loops -C no-vectorize-slp`, 2026-11-26).
+//! On a window of that size with 685 observations, two frames fixed, an iteration takes 1.03 million instructions with a
+//! new system and 0.54 million with a kept one, 0.84 million on average over the first five, which end on
+//! average no higher than five of Ceres (x86-64, callgrind, `-C no-vectorize-loops -C no-vectorize-slp`, 2026-11-26).
 //!
 //! # Examples
 //! ```

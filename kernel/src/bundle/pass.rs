@@ -1,9 +1,9 @@
 //! The two passes over the observations that make one iteration: building the reduced system, and going back to the
 //! points with the frames' step. Jacobians are computed in both, and stored in neither.
 
-use super::memory::{FrameSlot, NO_SLOT, ObservationSlot, PointSlot, Work};
+use super::memory::{FrameSlot, NO_SLOT, ObservationSlot, PointSlot, Seen, Work};
 use super::residual::{Robust, linearise, squared_residual};
-use super::small::{S3, V3, add, add_scaled, dot, inverse_factor, lower, sub, upper};
+use super::small::{M3, S3, V3, add, add_scaled, dot, inverse_factor, lower, sub, upper};
 use super::system::{System, add_spread, add_square_spread, add_turned, block_index, subtract_spread_vector};
 use crate::Real;
 
@@ -75,7 +75,7 @@ struct Observed<T> {
 }
 
 /// Linearises the observations of a point into the work space of their frames. Those that a free frame or a free point
-/// does not turn into an unknown are left out.
+/// does not turn into an unknown are left out. `then` is called with every one, with its frame's axes and column block.
 #[inline(always)]
 fn observe<T: Real>(
     frames: &mut [FrameSlot<T>],
@@ -83,6 +83,7 @@ fn observe<T: Real>(
     x: &V3<T>,
     robust: &Robust<T>,
     is_free: bool,
+    mut then: impl FnMut(&mut Seen<T>, &M3<T>, usize),
 ) -> Observed<T> {
     let mut observed = Observed { rho: T::ZERO, seen: 0, behind: 0 };
     for o in group {
@@ -98,6 +99,9 @@ fn observe<T: Real>(
         };
         observed.rho += rho;
         observed.seen += 1;
+        if let Work::Seen(seen) = &mut frame.work {
+            then(seen, &frame.pose.rotation, frame.slot as usize);
+        }
     }
     observed
 }
@@ -124,7 +128,17 @@ pub(super) fn build<T: Real>(
     for (index, group) in Groups(observations) {
         let Some(point) = points.get_mut(index) else { continue };
         let is_free = free.is_free(index, point);
-        let observed = observe(frames, group, &point.position, robust, is_free);
+        let (mut v, mut g) = ([T::ZERO; 6], [T::ZERO; 3]);
+        let observed = observe(frames, group, &point.position, robust, is_free, |seen, axes, _| {
+            if is_free {
+                let (pull, mut n) = (seen.g, seen.n);
+                seen.add_to_point(axes, &mut v, |k, row, weighted| {
+                    add_scaled(&mut g, &row, pull[k]);
+                    n[k] = weighted;
+                });
+                seen.n = n;
+            }
+        });
         built.behind += observed.behind;
         point.trial = [T::ZERO; 3];
         if is_free && observed.seen < 2 {
@@ -133,28 +147,19 @@ pub(super) fn build<T: Real>(
         }
         built.rho += observed.rho;
         built.used += observed.seen;
-        let (mut v, mut g) = ([T::ZERO; 6], [T::ZERO; 3]);
-        for o in group {
-            let Some(frame) = frames.get_mut(o.frame as usize) else { continue };
-            let Work::Seen(seen) = &mut frame.work else { continue };
-            let mut n = [[T::ZERO; 3]; 2];
-            seen.add_to_point(&frame.pose.rotation, &mut v, |k, row, weighted| {
-                add_scaled(&mut g, &row, seen.g[k]);
-                n[k] = weighted;
-            });
-            seen.n = n;
-        }
         let factor = if is_free { damped_factor(&v, lambda) } else { None };
         if let Some(l) = &factor {
             point.trial = lower(l, &g);
             built.promised += dot(&point.trial, &point.trial);
         }
-        eliminate(frames, group, system, factor.as_ref().map(|l| (l, &point.trial)));
+        let point = factor.map(|l| (l, upper(&l, &point.trial)));
+        eliminate(frames, group, system, point.as_ref().map(|(l, moved)| (l, moved)));
     }
     built
 }
 
-/// Adds a point's share of the system, less what its own motion takes of it.
+/// Adds a point's share of the system, less what its own motion takes of it. Of the point: the factor of its block, and
+/// how far it would move were the frames held.
 #[inline(always)]
 fn eliminate<T: Real>(
     frames: &mut [FrameSlot<T>],
@@ -174,23 +179,26 @@ fn eliminate<T: Real>(
         if frame.slot == NO_SLOT {
             continue;
         }
-        seen.rotation = seen.rotation_jacobian();
-        let [a, h, b] = seen.info;
-        let (mut k, mut g) = ([[a, h], [h, b]], seen.g);
-        if let Some((l, z)) = point {
-            seen.n = [lower(l, &seen.n[0]), lower(l, &seen.n[1])];
-            let n = &seen.n;
-            g = [g[0] - dot(&n[0], z), g[1] - dot(&n[1], z)];
-            let across = dot(&n[0], &n[1]);
-            k = [[a - dot(&n[0], &n[0]), h - across], [h - across, b - dot(&n[1], &n[1])]];
+        let mut g = seen.g;
+        if let Some((_, moved)) = point {
+            g = [g[0] - dot(&seen.n[0], moved), g[1] - dot(&seen.n[1], moved)];
         }
-        let frames = &*frames;
-        let Some(Work::Seen(seen)) = frames.get(o.frame as usize).map(|f| &f.work) else { continue };
         let Some(rhs) = system.rhs.get_mut(slot) else { continue };
         subtract_spread_vector(rhs, seen, g);
         if system.lagged {
             continue;
         }
+        seen.rotation = seen.rotation_jacobian();
+        let [a, h, b] = seen.info;
+        let mut k = [[a, h], [h, b]];
+        if let Some((l, _)) = point {
+            seen.n = [lower(l, &seen.n[0]), lower(l, &seen.n[1])];
+            let n = &seen.n;
+            let across = dot(&n[0], &n[1]);
+            k = [[a - dot(&n[0], &n[0]), h - across], [h - across, b - dot(&n[1], &n[1])]];
+        }
+        let frames = &*frames;
+        let Some(Work::Seen(seen)) = frames.get(o.frame as usize).map(|f| &f.work) else { continue };
         let Some(row) = system.blocks.get_mut(block_index(slot, 0)..=block_index(slot, slot)) else {
             continue;
         };
@@ -235,24 +243,21 @@ pub(super) fn back_substitute<T: Real>(
         let Some(point) = points.get_mut(index) else { continue };
         let is_free = free.is_free(index, point);
         let z = core::mem::replace(&mut point.trial, point.position);
-        let observed = observe(frames, group, &point.position, robust, is_free);
-        if is_free && observed.seen < 2 {
-            continue;
-        }
-        if is_free {
-            let (mut v, mut pull) = ([T::ZERO; 6], [T::ZERO; 3]);
-            for o in group {
-                let Some(frame) = frames.get(o.frame as usize) else { continue };
-                let Work::Seen(seen) = &frame.work else { continue };
-                let moved = step.get(frame.slot as usize).map_or([T::ZERO; 2], |d| seen.moved_by(d));
-                seen.add_to_point(&frame.pose.rotation, &mut v, |k, _, weighted| {
+        let (mut v, mut pull) = ([T::ZERO; 6], [T::ZERO; 3]);
+        let observed = observe(frames, group, &point.position, robust, is_free, |seen, axes, slot| {
+            if is_free {
+                let moved = step.get(slot).map_or([T::ZERO; 2], |d| seen.moved_by(d));
+                seen.add_to_point(axes, &mut v, |k, _, weighted| {
                     add_scaled(&mut pull, &weighted, moved[k]);
                 });
             }
-            if let Some(l) = damped_factor(&v, lambda) {
-                let dx = upper(&l, &add(&z, &lower(&l, &pull)));
-                point.trial = sub(&point.position, &dx);
-            }
+        });
+        if is_free && observed.seen < 2 {
+            continue;
+        }
+        if is_free && let Some(l) = damped_factor(&v, lambda) {
+            let dx = upper(&l, &add(&z, &lower(&l, &pull)));
+            point.trial = sub(&point.position, &dx);
         }
         let mut after = cost(frames, group, &point.trial, robust);
         if after.is_none() {

@@ -1,6 +1,7 @@
 //! The reduced linear system of the frames: a lower triangle of 6x6 blocks, its Cholesky factor and its solution.
 
 use super::memory::{Seen, system_len};
+use super::small::cross;
 use crate::Real;
 use crate::real::sqrt;
 
@@ -340,15 +341,9 @@ pub(super) fn add_turned<T: Real>(block: &mut Block<T>, a: &Seen<T>, k: &[[T; 2]
 /// Subtracts `J' g` from a vector.
 #[inline(always)]
 pub(super) fn subtract_spread_vector<T: Real>(to: &mut [T; 6], a: &Seen<T>, g: [T; 2]) {
-    let [r, s] = &a.rotation;
-    let spread = [
-        r[0] * g[0] + s[0] * g[1],
-        r[1] * g[0] + s[1] * g[1],
-        r[2] * g[0] + s[2] * g[1],
-        g[0],
-        g[1],
-        a.plane[0] * g[0] + a.plane[1] * g[1],
-    ];
+    let force = [g[0], g[1], a.plane[0] * g[0] + a.plane[1] * g[1]];
+    let moment = cross(&a.y, &force);
+    let spread = [moment[0], moment[1], moment[2], force[0], force[1], force[2]];
     if a.turn == 0 {
         for k in 0..6 {
             to[k] -= spread[k];
