@@ -82,8 +82,8 @@ impl<T: Real> Window<'_, T> {
     /// itself lets relative measurements pass, to second order, for knowledge of the heading: after 10,000 frames deviations were told a third too small and the error had grown to 8.8 m, against 1.9 m by
     /// the anchor (`bundle_flight long 10000 7`); the invariance is that of A. Barrau, S. Bonnabel, "The invariant
     /// extended Kalman filter as a stable observer", IEEE Transactions on Automatic Control 62(4), 2017. Over 300 frames and five other flights the position
-    /// error is 0.99 times that of full bundle adjustment, 0.69 to 2.2 times in one (`bundle_flight 300 5 1 1000` in
-    /// `host-tests`, 2026-11-26); letting a frame from the middle leave by turns made no difference (1.08).
+    /// error is 0.98 times that of full bundle adjustment, 0.70 to 2.1 times in one (`bundle_flight 300 5 1 1000` in
+    /// `host-tests`, 2026-11-26); letting a frame from the middle leave by turns made no difference (1.09).
     pub fn marginalise_frame(&mut self, frame: FrameHandle, loss: &Loss<T>) -> Result<usize, WindowError> {
         self.frame(frame)?;
         if !self.has_prior_memory() {
