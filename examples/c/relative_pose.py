@@ -23,6 +23,7 @@ class Options(ctypes.Structure):
     _fields_ = [(name, ctypes.c_uint32) for name in ("size", "min_iterations", "max_iterations", "max_solver_calls")] + [
         ("max_residuals", ctypes.c_uint64), ("seed", ctypes.c_uint64),
         ("confidence", ctypes.c_double), ("max_error_px", ctypes.c_double), ("sigma_px", ctypes.c_double),
+        ("least_motion_px", ctypes.c_double),
         ("prior_view1", ctypes.c_double * 3), ("prior_view2", ctypes.c_double * 3), ("prior_sigma_rad", ctypes.c_double),
         ("prior_rotation", ctypes.c_double * 4), ("prior_covariance", ctypes.c_double * 9), ("prior", ctypes.c_uint32),
     ]
