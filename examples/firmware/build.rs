@@ -32,6 +32,13 @@ fn main() {
         _ => None,
     };
     println!("cargo:rustc-check-cfg=cfg(qemu_arm, small_ram)");
+    // The compiler does not tell of the F extension.
+    println!("cargo:rustc-check-cfg=cfg(fpu, values(\"arm\", \"riscv\"))");
+    match &*target {
+        hard if hard.ends_with("eabihf") => println!("cargo:rustc-cfg=fpu=\"arm\""),
+        "riscv32imafc-unknown-none-elf" => println!("cargo:rustc-cfg=fpu=\"riscv\""),
+        _ => (),
+    }
     println!("cargo:rustc-check-cfg=cfg(uart, values(\"cmsdk\", \"ns16550\"))");
     match layout {
         "mps2-an386" => println!("cargo:rustc-cfg=uart=\"cmsdk\""),
