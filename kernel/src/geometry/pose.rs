@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix3, Matrix3x2, Quaternion, Translation3, UnitQuat
 
 use crate::Real;
 use crate::linalg::{Svd3, svd3};
-use crate::real::{abs, atan2, copysign, is_finite, lit, max, sin_cos, sqrt};
+use crate::real::{abs, atan2, is_finite, lit, max, sin_cos, sqrt};
 
 /// A pose maps into the camera: `x_cam = R X + t`. Of two views, the pose of view 2 in the frame of view 1:
 /// `X2 = R X1 + t`, |t| = 1 where scale is unobservable.
@@ -33,7 +33,7 @@ pub fn quaternion_from_matrix<T: Real>(r: &Matrix3<T>) -> UnitQuaternion<T> {
     let column_y = [wy, xy, minus + difference, yz];
     let column_z = [wz, xz, yz, minus - difference];
     let add = |a: &[T; 4], b: &[T; 4], sign: T| {
-        let s = copysign(T::ONE, sign);
+        let s = if sign < T::ZERO { -T::ONE } else { T::ONE };
         [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2], a[3] + s * b[3]]
     };
     let (u, v) = (add(&column_w, &column_x, wx), add(&column_y, &column_z, yz));
@@ -42,10 +42,10 @@ pub fn quaternion_from_matrix<T: Real>(r: &Matrix3<T>) -> UnitQuaternion<T> {
     UnitQuaternion::new_unchecked(Quaternion::new(w * scale, x * scale, y * scale, z * scale))
 }
 
-/// The pose, if all its numbers are finite.
+/// The pose, if all its numbers, and their sum, are finite.
 pub(crate) fn finite<T: Real>(pose: Pose<T>) -> Option<Pose<T>> {
-    let mut numbers = pose.rotation.coords.iter().chain(pose.translation.vector.iter());
-    numbers.all(|&x| is_finite(x)).then_some(pose)
+    let (q, t) = (&pose.rotation.coords, &pose.translation.vector);
+    is_finite((q.x + q.y) + (q.z + q.w) + (t.x + t.y + t.z)).then_some(pose)
 }
 
 /// The cross-product matrix `[v]x`, with `[v]x u = v x u`.
@@ -334,8 +334,14 @@ pub fn upright<T: Real>(gravity: &Vector3<T>) -> Option<Matrix3<T>> {
 /// `z' = c z - s x`. `(c, s)` must be a unit vector; it is not checked.
 #[inline]
 pub(crate) fn rotation_about_y<T: Real>(c: T, s: T) -> UnitQuaternion<T> {
-    // (1 + c, s) and (s, 1 - c) are along the half angle's (cos, sin): added with the signs that let them add up.
-    let (w, y) = (T::ONE + c + abs(s), s + copysign(T::ONE - c, s));
+    // (1 + c, s) and (s, 1 - c) are along the half angle's (cos, sin); one of them is not short.
+    let (w, y) = if c > T::ZERO {
+        (T::ONE + c, s)
+    } else if s > T::ZERO {
+        (s, T::ONE - c)
+    } else {
+        (-s, c - T::ONE)
+    };
     let scale = T::ONE / sqrt(w * w + y * y);
     let (w, y) = (w * scale, y * scale);
     UnitQuaternion::new_unchecked(Quaternion::new(w, T::ZERO, y, T::ZERO))

@@ -4,10 +4,10 @@
 //! a root of the cubic `det(C1 + s C2) = 0` it is a pair of lines: two intersections of a line with a conic remain. If
 //! the conics meet in real points, each real root gives real lines.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use crate::Real;
-use crate::real::{abs, copysign, lit, max, min, sqrt};
+use crate::real::{abs, lit, max, min, sqrt};
 
 /// Newton steps allowed for a root; five are usual, a start far from a triple root gains a factor 2/3 a step.
 const MAX_STEPS: usize = 40;
@@ -17,10 +17,10 @@ const MAX_STEPS: usize = 40;
 ///
 /// Householder's method of order three from beyond that root, where the cubic is convex: the steps only approach it, without trigonometry
 /// or cube roots. The start is where the parabola that touches the cubic at its extremum has its root, or above the
-/// root of a monotone cubic. The error after a step is of the order of its fourth power; the last step is below 1 % of
-/// the distance to the other roots, so that 1e-8 of it remains.
+/// root of a monotone cubic. The error after a step is of the order of its fourth power; the last step is below
+/// `last_step` of the distance to the other roots.
 #[inline]
-pub(crate) fn real_root_of_cubic<T: Real>(c2: T, c1: T, c0: T) -> T {
+pub(crate) fn real_root_of_cubic<T: Real>(c2: T, c1: T, c0: T, last_step: T) -> T {
     let three = lit::<T>(3.0);
     let value = |x: T| ((x + c2) * x + c1) * x + c0;
     // About the inflection: t^3 - 3 p t + q, the isolated root on the side of -q.
@@ -33,7 +33,7 @@ pub(crate) fn real_root_of_cubic<T: Real>(c2: T, c1: T, c0: T) -> T {
     let extremum = sqrt(max(size, T::EPSILON * (T::ONE + c2 * c2)));
     let above = if p > T::ZERO { extremum } else { T::ZERO };
     let t = above + sqrt((abs(q) / extremum + (size + p)) * lit::<T>(1.0 / 3.0));
-    let mut x = centre - copysign(t, q);
+    let mut x = if q > T::ZERO { centre - t } else { centre + t };
     let step = |x: T| {
         let f = value(x);
         let half_curvature = three * x + c2;
@@ -43,7 +43,7 @@ pub(crate) fn real_root_of_cubic<T: Real>(c2: T, c1: T, c0: T) -> T {
         f * (square - product) / (slope * (square - product - product) + f * f)
     };
     x -= step(x);
-    let tolerance = lit::<T>(0.01) * min(t, T::ONE + abs(x));
+    let tolerance = last_step * min(t, T::ONE + abs(x));
     for _ in 0..MAX_STEPS {
         let step = step(x);
         x -= step;
@@ -54,12 +54,10 @@ pub(crate) fn real_root_of_cubic<T: Real>(c2: T, c1: T, c0: T) -> T {
     x
 }
 
-/// Lines `p`, `q` with `c ~ p q' + q p'`, for a symmetric `c` of rank two whose lines are real; where they are not,
+/// Lines `p`, `q` with `c ~ p q' + q p'`, for a symmetric `c` (its upper triangle) of rank two whose lines are real; where they are not,
 /// the nearest double line.
 #[inline]
-pub(crate) fn lines_of_conic<T: Real>(c: &Matrix3<T>) -> [Vector3<T>; 2] {
-    let (c00, c01, c02) = (c[(0, 0)], c[(0, 1)], c[(0, 2)]);
-    let (c11, c12, c22) = (c[(1, 1)], c[(1, 2)], c[(2, 2)]);
+pub(crate) fn lines_of_conic<T: Real>([c00, c01, c02, c11, c12, c22]: [T; 6]) -> [Vector3<T>; 2] {
     // The adjugate is -v v' with v = p x q (up to a factor); the first entry of v is not needed, and of the others the
     // larger gives the smaller without cancellation.
     let a11 = c02 * c02 - c00 * c22;

@@ -4,11 +4,11 @@
 //! `|d_i x_i - d_j x_j|^2 = |X_i - X_j|^2 =: a_ij`. Two of the three differences that have no constant are conics in
 //! (d0, d1, d2); the degenerate conic of their pencil is two lines, on each of which a quadratic remains.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use crate::geometry::{Pose, pose};
 use crate::linalg::conic::{lines_of_conic, real_root_of_cubic};
-use crate::real::{abs, copysign, lit, max, min, sqrt};
+use crate::real::{abs, lit, max, min, sqrt};
 use crate::{Real, Solutions};
 
 /// Newton steps on the three distances.
@@ -82,7 +82,7 @@ pub fn p3p<T: Real>(bearings: &[Vector3<T>; 3], points: &[Vector3<T>; 3]) -> Sol
     let least = T::EPSILON * lit::<T>(64.0) * (abs(k2) + abs(k1) + abs(k0));
     let k3 = if abs(k3) > least { k3 } else { least };
     let inverse = T::ONE / k3;
-    let root = real_root_of_cubic(k2 * inverse, k1 * inverse, k0 * inverse);
+    let root = real_root_of_cubic(k2 * inverse, k1 * inverse, k0 * inverse, lit(0.01));
     // The pair of lines s1 D01 + s2 D02; what follows takes fourth powers.
     let (s1, s2) = if abs(root) > lit(1e3) { (T::ONE / root, T::ONE) } else { (T::ONE, root) };
     let c00 = s1 + s2;
@@ -91,7 +91,6 @@ pub fn p3p<T: Real>(bearings: &[Vector3<T>; 3], points: &[Vector3<T>; 3]) -> Sol
     let (c11, c22) = (s1 - ab, s2 - ab);
     let (am12, bm12) = (a * m12, b * m12);
     let c12 = ab * m12;
-    let conic = Matrix3::new(c00, c01, c02, c01, c11, c12, c02, c12, c22);
 
     // R maps (f1, f2, f1 x f2) to the same of the camera's points: R = [e1 e2 e1 x e2] [g1 g2 g3]'
     let normal = f1.cross(&f2);
@@ -108,7 +107,7 @@ pub fn p3p<T: Real>(bearings: &[Vector3<T>; 3], points: &[Vector3<T>; 3]) -> Sol
     // not real becomes NaN and fails the last comparison.
     let mut candidates = [[T::ZERO; 3]; 4];
     let mut count = 0;
-    for line in lines_of_conic(&conic) {
+    for line in lines_of_conic([c00, c01, c02, c11, c12, c22]) {
         // l0 d0 = -(l1 d1 + l2 d2), then q2 d1^2 + 2 q1 d1 d2 + q0 d2^2 = 0
         let (l0, l1, l2) = (line.x, line.y, line.z);
         let (l00, l11, l22, l12) = (l0 * l0, l1 * l1, l2 * l2, l1 * l2);
@@ -121,7 +120,7 @@ pub fn p3p<T: Real>(bearings: &[Vector3<T>; 3], points: &[Vector3<T>; 3]) -> Sol
         // A double root may fall on either side of zero by rounding.
         let rounding = (square + abs(product)) * T::EPSILON * lit::<T>(64.0);
         let root = sqrt(max(discriminant, min(discriminant + rounding, T::ZERO)));
-        let q = -(q1 + copysign(root, q1));
+        let q = if q1 > T::ZERO { -q1 - root } else { root - q1 };
         let inverse = -T::ONE / l0;
         let (w1, w2) = (l1 * inverse, l2 * inverse);
         // d1 : d2

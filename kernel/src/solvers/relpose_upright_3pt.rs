@@ -6,12 +6,12 @@
 //! `Im(G_k / e) Im(conj(A_i - B_i e) (A_j - B_j e))`: a trigonometric polynomial of degree two, that is a conic in
 //! (c, s), which meets the circle `c^2 + s^2 = 1` in up to four points. A pair of lines passes through them.
 
-use nalgebra::{Matrix3, Translation3, Vector3};
+use nalgebra::{Translation3, Vector3};
 
 use crate::geometry::Pose;
 use crate::geometry::pose::rotation_about_y;
 use crate::linalg::conic::{lines_of_conic, real_root_of_cubic};
-use crate::real::{abs, copysign, lit, max, min, sqrt};
+use crate::real::{abs, lit, max, sqrt};
 use crate::{Real, Solutions};
 
 /// The up to four relative poses of three correspondences, if both frames have the vertical as their y axis.
@@ -29,16 +29,19 @@ use crate::{Real, Solutions};
 /// horizontal plane through the camera centres any rotation fits, and what is returned is arbitrary.
 ///
 /// # Accuracy
-/// Noise-free, depth 2 to 20: `f64` 100 % within 1e-6 rad; `f32` 99.8 to 100 % within 1e-3 rad, 99.4 % for baselines of
-/// 0.2 to 1.
+/// Noise-free, depth 2 to 20 or baselines of 0.2 to 1: `f64` 100 % within 1e-6 rad; `f32` 99.98 % within 1e-3 rad, where
+/// the rest are roots that all but merge.
 ///
 /// # Cost
-/// Two or three steps on a cubic, then a square root, one Newton step and the signs of six distances for each solution.
+/// Two or three steps on a cubic, a square root for each two solutions, two more for each one. Roots that are close
+/// together by the measure of the scalar's rounding (half of them in `f32`, next to none in `f64`) are found, or refined by
+/// a Newton step, on the normals themselves.
 ///
 /// # References
 /// F. Fraundorfer, P. Tanskanen, M. Pollefeys, "A minimal case solution to the calibrated relative pose problem for the
 /// case of two known orientation angles", ECCV 2010. Here the quartic is never formed: it is solved as the
-/// intersection of a conic with the unit circle, so that no rotation is at infinity.
+/// intersection of a conic with the unit circle, so that no rotation is at infinity, and the cancellation in its
+/// coefficients is repaired where it matters.
 ///
 /// # Examples
 /// ```
@@ -69,123 +72,198 @@ pub fn relpose_upright_3pt<T: Real>(x1: &[Vector3<T>; 3], x2: &[Vector3<T>; 3]) 
     let s2 = Complex(t0.0.0 + t1.0.0 + t2.0.0, t0.0.1 + t1.0.1 + t2.0.1);
     let s1 = Complex(t0.1.0 + t1.1.0 + t2.1.0, t0.1.1 + t1.1.1 + t2.1.1);
     let s0 = t0.2 + t1.2 + t2.2;
-    let size = abs(s2.0) + abs(s2.1) + abs(s1.0) + abs(s1.1) + abs(s0);
-    let inverse = T::ONE / size;
-    if !(size > T::MIN_POSITIVE && inverse > T::ZERO) {
-        return solutions;
-    }
-    let (s2, s1, s0) = (s2.scale(inverse), s1.scale(inverse), s0 * inverse);
+    // Where it is zero or not a number no line below meets the circle.
+    let inverse_size = T::ONE / (abs(s2.0) + abs(s2.1) + abs(s1.0) + abs(s1.1) + abs(s0));
+    let (s2, s1, s0) = (s2.scale(inverse_size), s1.scale(inverse_size), s0 * inverse_size);
 
     // The conic minus r times the circle is degenerate.
     let n2 = s2.0 * s2.0 + s2.1 * s2.1;
-    let n1 = s1.0 * s1.0 + s1.1 * s1.1;
-    let mixed = s2.0 * (s1.0 * s1.0 - s1.1 * s1.1) + T::TWO * s2.1 * s1.0 * s1.1;
-    let r = real_root_of_cubic(-s0, n1 - n2, s0 * n2 - mixed);
-    let (cc, ss) = (s2.0 - r, -s2.0 - r);
+    let (p, q) = (s1.0 * s1.0, s1.1 * s1.1);
+    let product = s1.0 * s1.1;
+    let mixed = s2.0 * (p - q) + s2.1 * (product + product);
+    let r = real_root_of_cubic(-s0, p + q - n2, s0 * n2 - mixed, lit(1e-4));
     // The axis with the larger square first, for it is divided by.
-    let swapped = abs(ss) > abs(cc);
-    let lines = if swapped {
-        lines_of_conic(&Matrix3::new(ss, s2.1, -s1.0, s2.1, cc, s1.1, -s1.0, s1.1, r - s0))
-    } else {
-        lines_of_conic(&Matrix3::new(cc, s2.1, s1.1, s2.1, ss, -s1.0, s1.1, -s1.0, r - s0))
-    };
+    let swapped = s2.0 * r > T::ZERO;
+    let (first, second, mixed_first, mixed_second) =
+        if swapped { (-s2.0 - r, s2.0 - r, -s1.0, s1.1) } else { (s2.0 - r, -s2.0 - r, s1.1, -s1.0) };
+    let lines = lines_of_conic([first, s2.1, mixed_first, second, mixed_second, r - s0]);
+    let mut candidates = [((T::ZERO, T::ZERO), T::ZERO); 4];
+    let mut count = 0;
     for line in lines {
-        let (l0, l1) = if swapped { (line.y, line.x) } else { (line.x, line.y) };
-        let square = l0 * l0 + l1 * l1;
-        let off = line.z * line.z;
-        let discriminant = square - off;
-        // A tangent may miss the circle by rounding.
-        let rounding = (square + off) * T::EPSILON * lit::<T>(64.0);
-        let root = sqrt(max(discriminant, min(discriminant + rounding, T::ZERO)));
-        let inverse = T::ONE / square;
-        for root in [root, -root] {
-            let c = (-line.z * l0 - l1 * root) * inverse;
-            let s = (-line.z * l1 + l0 * root) * inverse;
-            // One Newton step on the angle.
-            let (cos2, sin2) = (c * c - s * s, T::TWO * c * s);
-            let f = s2.0 * cos2 + s2.1 * sin2 + T::TWO * (s1.1 * c - s1.0 * s) - s0;
-            let half_slope = s2.1 * cos2 - s2.0 * sin2 - s1.1 * s - s1.0 * c;
-            let step = -T::HALF * f / half_slope;
-            let step = if abs(step) < lit::<T>(0.1) { step } else { T::ZERO };
-            let (c, s) = (c - step * s, s + step * c);
-            // A unit vector but for the square of the step: a step of the reciprocal square root.
-            let scale = lit::<T>(1.5) - T::HALF * (c * c + s * s);
-            if let Some(pose) = pose_of_angle(c * scale, s * scale, x1, x2) {
-                solutions.push(pose);
+        let inverse = T::ONE / (line.x * line.x + line.y * line.y);
+        let k = line.z * inverse;
+        let (foot_x, foot_y) = (-k * line.x, -k * line.y);
+        // The square of half the chord that the circle cuts off.
+        let half_sq = T::ONE - k * line.z;
+        let mut reach = T::ZERO;
+        let pair = if half_sq * half_sq < T::EPSILON * lit(0.25) {
+            let foot = if swapped { (foot_y, foot_x) } else { (foot_x, foot_y) };
+            // Half the second derivative at the foot.
+            let (product, difference) = (foot.0 * foot.1, foot.0 * foot.0 - foot.1 * foot.1);
+            let curvature =
+                -(s2.0 * difference + s2.1 * (product + product)) - T::HALF * (s1.1 * foot.0 - s1.0 * foot.1);
+            let Some((pair, separation_sq)) = near_double_root(foot, curvature / inverse_size, x1, x2) else {
+                continue;
+            };
+            reach = separation_sq;
+            pair
+        } else if half_sq > T::ZERO {
+            if half_sq < T::EPSILON * lit(65_536.0) {
+                reach = half_sq;
             }
+            let half = sqrt(half_sq * inverse);
+            let (along_x, along_y) = (half * line.y, half * line.x);
+            let (u, v) = ((foot_x - along_x, foot_y + along_y), (foot_x + along_x, foot_y - along_y));
+            if swapped { [(u.1, u.0), (v.1, v.0)] } else { [u, v] }
+        } else {
+            continue;
+        };
+        for root in pair {
+            if let Some(candidate) = candidates.get_mut(count) {
+                *candidate = (root, reach);
+            }
+            count += 1;
+        }
+    }
+    for &(e, reach) in candidates.iter().take(count) {
+        // In radians; zero for a root that is well conditioned.
+        let step = if reach > T::ZERO { newton(e, (s2, s1), inverse_size, reach, x1, x2) } else { T::ZERO };
+        let e = (e.0 - step * e.1, e.1 + step * e.0);
+        if !push_pose(e, x1, x2, &mut solutions) {
+            push_pose_of_other_points(e, x1, x2, &mut solutions);
         }
     }
     solutions
 }
 
-/// The pose of the rotation by a root of the determinant; `None` where a point is behind a camera.
-#[inline]
-fn pose_of_angle<T: Real>(c: T, s: T, x1: &[Vector3<T>; 3], x2: &[Vector3<T>; 3]) -> Option<Pose<T>> {
-    let turn = |v: &Vector3<T>| Vector3::new(c * v.x + s * v.z, v.y, c * v.z - s * v.x);
-    let ([a0, a1, a2], [z0, z1, z2]) = (x1, x2);
-    let (y0, y1) = (turn(a0), turn(a1));
-    let (n0, n1) = (y0.cross(z0), y1.cross(z1));
-    // Of the three planes two make a wide enough angle.
-    let wide = |t: &Vector3<T>, n0: &Vector3<T>, n1: &Vector3<T>| {
-        t.norm_squared() > lit::<T>(0.05) * n0.norm_squared() * n1.norm_squared()
-    };
-    let t01 = n0.cross(&n1);
-    let t = if wide(&t01, &n0, &n1) {
-        in_front(t01, [&y0, z0, &n0], [&y1, z1, &n1], &|| turn(a2), z2)?
-    } else {
-        let y2 = turn(a2);
-        let n2 = y2.cross(z2);
-        let t12 = n1.cross(&n2);
-        if wide(&t12, &n1, &n2) {
-            in_front(t12, [&y1, z1, &n1], [&y2, z2, &n2], &|| y0, z0)?
-        } else {
-            in_front(n2.cross(&n0), [&y2, z2, &n2], [&y0, z0, &n0], &|| y1, z1)?
-        }
-    };
-    Some(Pose::from_parts(Translation3::from(t), rotation_about_y(c, s)))
+/// `x` turned about y.
+#[inline(always)]
+fn turned<T: Real>((c, s): (T, T), x: &Vector3<T>) -> Vector3<T> {
+    Vector3::new(c * x.x + s * x.z, x.y, c * x.z - s * x.x)
 }
 
-/// The unit translation `t = +-n0 x n1` that has three points in front, two of them given by the turned first bearing `y`,
-/// the second `z` and the normal `n = y x z`.
-#[inline]
-fn in_front<T: Real>(
-    t: Vector3<T>,
-    [y0, z0, n0]: [&Vector3<T>; 3],
-    [y1, z1, n1]: [&Vector3<T>; 3],
-    y2: &impl Fn() -> Vector3<T>,
-    z2: &Vector3<T>,
-) -> Option<Vector3<T>> {
-    // `d1 n = z x t`, `d2 n = y x t`, and z0 x (n0 x n1) = n0 (z0 n1): the signs of the first two points without t
-    let (a, b) = (z0.dot(n1), y0.dot(n1));
-    let (c, d) = (z1.dot(n0), y1.dot(n0));
-    let sign = copysign(T::ONE, a);
-    if !((a * sign > T::ZERO) & (b * sign > T::ZERO) & (c * sign < T::ZERO) & (d * sign < T::ZERO)) {
+/// A Newton step on the determinant of the small normals themselves, free of the cancellation in the polynomial's
+/// coefficients; zero where it is longer than a quarter of `reach`, which is squared.
+#[inline(always)]
+fn newton<T: Real>(
+    e: (T, T),
+    (s2, s1): (Complex<T>, Complex<T>),
+    scale: T,
+    reach: T,
+    x1: &[Vector3<T>; 3],
+    x2: &[Vector3<T>; 3],
+) -> T {
+    let (c, s) = e;
+    let (product, difference) = (c * s, c * c - s * s);
+    let slope = s2.1 * difference - s2.0 * (product + product) - (s1.1 * s + s1.0 * c);
+    let ([a0, a1, a2], [z0, z1, z2]) = (x1, x2);
+    let (n0, n1, n2) = (turned(e, a0).cross(z0), turned(e, a1).cross(z1), turned(e, a2).cross(z2));
+    let step = -(n2.dot(&n0.cross(&n1)) * scale / slope);
+    if step * step < reach * lit(0.0625) { step } else { T::ZERO }
+}
+
+/// The two roots near `e`, of the determinant's parabola there: value and slope of the small normals themselves, free of
+/// the cancellation in the polynomial's coefficients. `None` where they are not real.
+#[cold]
+fn near_double_root<T: Real>(
+    (c, s): (T, T),
+    half_curvature: T,
+    x1: &[Vector3<T>; 3],
+    x2: &[Vector3<T>; 3],
+) -> Option<([(T, T); 2], T)> {
+    let scale = T::ONE / sqrt(c * c + s * s);
+    let (c, s) = (c * scale, s * scale);
+    let normal = |x: &Vector3<T>, z: &Vector3<T>| {
+        let y = turned((c, s), x);
+        // And its derivative by the angle.
+        (y.cross(z), Vector3::new(y.x * z.y, -(y.x * z.x + y.z * z.z), y.z * z.y))
+    };
+    let ([a0, a1, a2], [z0, z1, z2]) = (x1, x2);
+    let ((n0, r0), (n1, r1), (n2, r2)) = (normal(a0, z0), normal(a1, z1), normal(a2, z2));
+    let t = n0.cross(&n1);
+    let inverse = T::HALF / half_curvature;
+    let middle = -(r2.dot(&t) + n2.dot(&(r0.cross(&n1) + n0.cross(&r1)))) * inverse;
+    let discriminant = middle * middle - T::TWO * n2.dot(&t) * inverse;
+    if !(discriminant >= -T::EPSILON) {
         return None;
     }
-    let y2 = y2();
-    let n2 = y2.cross(z2);
-    let t = t * (sign / sqrt(t.norm_squared()));
-    let along = n2.cross(z2);
-    let across = n2.cross(&y2);
-    ((along.dot(&t) > T::ZERO) & (across.dot(&t) > T::ZERO)).then_some(t)
+    let root = sqrt(max(discriminant, T::ZERO));
+    let at = |step: T| {
+        let (c, s) = (c - step * s, s + step * c);
+        let scale = T::ONE / sqrt(c * c + s * s);
+        (c * scale, s * scale)
+    };
+    Some(([at(middle - root), at(middle + root)], discriminant))
+}
+
+/// Adds the pose of the rotation by a root of the determinant, its translation from the first two points, unless a point
+/// is behind a camera. False where the epipolar planes of those two coincide and say nothing.
+#[inline(always)]
+fn push_pose<T: Real>(
+    e: (T, T),
+    x1: &[Vector3<T>; 3],
+    x2: &[Vector3<T>; 3],
+    solutions: &mut Solutions<Pose<T>, 4>,
+) -> bool {
+    let [z0, z1, z2] = x2;
+    let (y0, y1) = (turned(e, &x1[0]), turned(e, &x1[1]));
+    let (n0, n1) = (y0.cross(z0), y1.cross(z1));
+    // `d1 n = z x t`, `d2 n = y x t`, and z0 x (n0 x n1) = n0 (z0 n1): the signs of the first two points without t
+    let (a0, b0) = (z0.dot(&n1), y0.dot(&n1));
+    let (a1, b1) = (z1.dot(&n0), y1.dot(&n0));
+    let t = n0.cross(&n1);
+    let square = t.norm_squared();
+    if (a0 * b0 > T::ZERO) & (a0 * a1 < T::ZERO) & (a1 * b1 > T::ZERO) {
+        let y2 = turned(e, &x1[2]);
+        let across = t.cross(&y2.cross(z2));
+        let in_front = (a0 * across.dot(z2) > T::ZERO) & (a0 * across.dot(&y2) > T::ZERO);
+        if in_front && is_wide(square, &n0, &n1) {
+            let scale = T::ONE / sqrt(square);
+            let t = t * if a0 > T::ZERO { scale } else { -scale };
+            solutions.push(Pose::from_parts(Translation3::from(t), rotation_about_y(e.0, e.1)));
+            return true;
+        }
+    }
+    is_wide(square, &n0, &n1)
+}
+
+/// The same from the other two pairs of points.
+#[cold]
+#[inline(never)]
+fn push_pose_of_other_points<T: Real>(
+    e: (T, T),
+    x1: &[Vector3<T>; 3],
+    x2: &[Vector3<T>; 3],
+    solutions: &mut Solutions<Pose<T>, 4>,
+) {
+    let ([a0, a1, a2], [b0, b1, b2]) = (*x1, *x2);
+    if !push_pose(e, &[a1, a2, a0], &[b1, b2, b0], solutions) {
+        push_pose(e, &[a2, a0, a1], &[b2, b0, b1], solutions);
+    }
+}
+
+/// Whether two planes differ by more than rounding, `square` being that of their normals' cross product.
+#[inline(always)]
+fn is_wide<T: Real>(square: T, n0: &Vector3<T>, n1: &Vector3<T>) -> bool {
+    square > T::EPSILON * lit::<T>(8.0) * (n0.norm_squared() * n1.norm_squared())
 }
 
 #[derive(Clone, Copy)]
 struct Complex<T>(T, T);
 
 impl<T: Real> Complex<T> {
-    #[inline]
+    #[inline(always)]
     fn scale(self, k: T) -> Self {
         Self(self.0 * k, self.1 * k)
     }
 
-    #[inline]
+    #[inline(always)]
     fn sub(self, other: Self) -> Self {
         Self(self.0 - other.0, self.1 - other.1)
     }
 
     /// `conj(self) other`
-    #[inline]
+    #[inline(always)]
     fn conj_mul(self, other: Self) -> Self {
         Self(self.0 * other.0 + self.1 * other.1, self.0 * other.1 - self.1 * other.0)
     }
