@@ -144,7 +144,7 @@ fn turned<T: Real>((c, s): (T, T), x: &Vector3<T>) -> Vector3<T> {
 
 /// A Newton step on the determinant of the small normals themselves, free of the cancellation in the polynomial's
 /// coefficients; zero where it is longer than a quarter of `reach`, which is squared.
-#[inline(always)]
+#[inline]
 fn newton<T: Real>(
     e: (T, T),
     (s2, s1): (Complex<T>, Complex<T>),
@@ -252,18 +252,18 @@ fn is_wide<T: Real>(square: T, n0: &Vector3<T>, n1: &Vector3<T>) -> bool {
 struct Complex<T>(T, T);
 
 impl<T: Real> Complex<T> {
-    #[inline(always)]
+    #[inline]
     fn scale(self, k: T) -> Self {
         Self(self.0 * k, self.1 * k)
     }
 
-    #[inline(always)]
+    #[inline]
     fn sub(self, other: Self) -> Self {
         Self(self.0 - other.0, self.1 - other.1)
     }
 
     /// `conj(self) other`
-    #[inline(always)]
+    #[inline]
     fn conj_mul(self, other: Self) -> Self {
         Self(self.0 * other.0 + self.1 * other.1, self.0 * other.1 - self.1 * other.0)
     }
