@@ -11,7 +11,7 @@ use crate::refine::blocks::{BlockSlice, EpipolarBlock};
 use crate::robust::log_binomial_tail;
 
 /// Accidents expected at the most where something counts as proven.
-const ACCIDENTS: f64 = 0.01;
+pub(super) const ACCIDENTS: f64 = 0.01;
 /// A correspondence is explained by a model up to this many standard deviations in two dimensions: of true ones 4 in a
 /// million lie beyond.
 pub(super) const EXPLAINED_SIGMAS: f64 = 5.0;
@@ -44,17 +44,18 @@ fn ln_accidents<T: Real>(count: u32, agreeing: u32, freedom: u32, p: T) -> T {
 }
 
 /// [`beyond_chance`] with independent evidence beside the count: a statistic that lies `deviations` standard deviations
-/// above what chance makes of it.
+/// above what chance makes of it; at most so many `accidents` expected.
 pub(super) fn beyond_chance_with<T: Real>(
     count: u32,
     agreeing: u32,
     freedom: u32,
     p: T,
     deviations: T,
+    accidents: f64,
 ) -> bool {
     let by_count = min(ln_accidents(count, agreeing, freedom, p), T::ZERO);
     let z = max(deviations, T::ZERO);
-    by_count - z * z * T::HALF < ln(lit(ACCIDENTS))
+    by_count - z * z * T::HALF < ln(lit(accidents))
 }
 
 /// The chance of a wrong correspondence to lie within `threshold` of an epipolar line by the Sampson error: the area of

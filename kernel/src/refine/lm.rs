@@ -109,8 +109,7 @@ fn total<T: Real>(lanes: &Lanes<T>) -> T {
     (lanes[0] + lanes[1]) + (lanes[2] + lanes[3])
 }
 
-/// One pass over all correspondences. Those beyond the loss's support are left out; the others are packed into full
-/// blocks first, so that the derivatives are computed for them alone and no second copy of the data is needed.
+/// [`sampled_equations`] of every block.
 pub(crate) fn normal_equations<T, B, M, const P: usize>(
     data: BlockSlice<'_, B>,
     model: &M,
@@ -121,41 +120,78 @@ where
     B: EpipolarBlock<T>,
     M: Manifold<T, P>,
 {
+    sampled_equations(data, 1, model, loss)
+}
+
+/// One pass over every `step`-th block. Correspondences beyond the loss's support are left out; the others of blocks that
+/// hold such are packed into full blocks first, so that the derivatives are computed for them alone and no second copy of
+/// the data is needed.
+pub(crate) fn sampled_equations<T, B, M, const P: usize>(
+    data: BlockSlice<'_, B>,
+    step: usize,
+    model: &M,
+    loss: &Loss<T>,
+) -> NormalEquations<T, P>
+where
+    T: Real,
+    B: EpipolarBlock<T>,
+    M: Manifold<T, P>,
+{
+    let step = core::cmp::max(step, 1);
     let f = model.matrix();
     let tangents = model.tangents();
     let zero = [T::ZERO; LANES];
     let mut sums = Sums { hessian: [[zero; P]; P], gradient: [zero; P], cost: zero };
     let support = loss.support();
     let limit = support.unwrap_or(T::MAX);
-    let mut active = 0u32;
+    let (mut active, mut seen) = (0u32, 0usize);
     let mut pending = B::zero();
     let mut filled = 0usize;
     let mut left = data.count;
-    for block in data.blocks {
-        let (c, d) = block.residual(&f);
-        let mut inside = [false; LANES];
-        for l in 0..LANES {
-            inside[l] = l < left && c[l] * c[l] < limit * d[l];
-        }
-        left = left.saturating_sub(LANES);
-        if inside == [false; LANES] {
-            continue;
-        }
-        let admitted = model.admits(block);
-        for l in 0..LANES {
-            if inside[l] && admitted[l] {
-                pending.set_lane(filled, block, l);
-                filled += 1;
-                active += 1;
-                if filled == LANES {
-                    sums.add(&pending, &f, &tangents, loss, LANES);
-                    filled = 0;
+    // After the last block what is pending; one place for the derivatives keeps the code small.
+    for block in data.blocks.iter().step_by(step).map(Some).chain(core::iter::once(None)) {
+        let (mut current, mut lanes) = (pending, filled);
+        if let Some(block) = block {
+            let (c, d) = block.residual(&f);
+            let mut inside = [false; LANES];
+            for l in 0..LANES {
+                inside[l] = l < left && c[l] * c[l] < limit * d[l];
+            }
+            seen += core::cmp::min(left, LANES);
+            left = left.saturating_sub(step.saturating_mul(LANES));
+            if inside == [false; LANES] {
+                continue;
+            }
+            let admitted = model.admits(block);
+            for l in 0..LANES {
+                inside[l] &= admitted[l];
+            }
+            if inside == [true; LANES] {
+                active += LANES as u32;
+                (current, lanes) = (*block, LANES);
+            } else {
+                let mut ready = false;
+                for l in 0..LANES {
+                    if inside[l] {
+                        pending.set_lane(filled, block, l);
+                        filled += 1;
+                        active += 1;
+                        if filled == LANES {
+                            current = pending;
+                            filled = 0;
+                            ready = true;
+                        }
+                    }
                 }
+                if !ready {
+                    continue;
+                }
+                lanes = LANES;
             }
         }
-    }
-    if filled > 0 {
-        sums.add(&pending, &f, &tangents, loss, filled);
+        if lanes > 0 {
+            sums.add(&current, &f, &tangents, loss, lanes);
+        }
     }
     let mut hessian = SMatrix::<T, P, P>::zeros();
     let mut gradient = SVector::<T, P>::zeros();
@@ -166,7 +202,7 @@ where
             hessian.data.0[q][p] = total(&sums.hessian[a][b]);
         }
     }
-    let outside = from_u32::<T>((data.count as u32).saturating_sub(active));
+    let outside = from_u32::<T>((seen as u32).saturating_sub(active));
     let beyond = support.map_or(T::ZERO, |limit| loss.evaluate(limit).0);
     NormalEquations { hessian, gradient, cost: total(&sums.cost) + outside * beyond, active }
 }
@@ -230,6 +266,10 @@ where
             continue;
         };
         let step = -factors.solve(&best.equations.gradient);
+        // What the step promises would not be worth the pass that tells.
+        if -step.dot(&best.equations.gradient) <= tolerance * lit(0.1) * best.equations.cost {
+            break;
+        }
         let model = retract(&best.model, &step);
         let equations = normal_equations(&model);
         best.passes += 1;

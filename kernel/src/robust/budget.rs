@@ -32,7 +32,8 @@ pub struct Budget {
     /// Minimal problems solved (degenerate samples cost none). Default: no limit.
     pub max_solver_calls: u32,
     /// Residuals evaluated, of one correspondence under one model each. Default: no limit. The search stays
-    /// within it but for one local optimisation.
+    /// within it but for one local optimisation; a hypothesis is looked at where two residuals of every correspondence are
+    /// left (four where hypotheses are polished: a relative pose with a prior), so that less than that scores nothing.
     pub max_residuals: u64,
 }
 

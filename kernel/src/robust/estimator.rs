@@ -46,6 +46,12 @@ pub trait Estimator<T: Real, const S: usize> {
     /// The model after local optimisation on its inliers; none where that failed. Adds the residuals evaluated.
     fn refine(&self, model: &Self::Model, residuals: &mut u64) -> Option<Self::Model>;
 
+    /// True where more samples would lead to a model that is no better than this one, the best so far, for what all of
+    /// them tell: then [`DISCOVERIES`](Self::DISCOVERIES) asks for no more.
+    fn settles(&self, _model: &Self::Model) -> bool {
+        false
+    }
+
     /// True where the model, although it scores best, must not stand.
     fn reject(&self, _model: &Self::Model) -> bool {
         false

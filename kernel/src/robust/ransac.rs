@@ -156,6 +156,12 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
         }
         keep(&mut models, candidate);
         search.has_kept(&candidate.1, best.as_ref());
+        if leads && search.discoveries < E::DISCOVERIES {
+            if estimator.settles(&candidate.0, &mut search.refined_residuals) {
+                search.discoveries = E::DISCOVERIES;
+            }
+            search.add_up();
+        }
     }
     Consensus { models, report: search.report(models[0].map(|(_, score)| score)) }
 }

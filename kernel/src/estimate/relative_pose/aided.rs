@@ -15,12 +15,10 @@ use super::prior::KnownRotation;
 use super::verdict::RelativePoseVerdict;
 use crate::Real;
 use crate::geometry::pose::upright;
-use crate::linalg::{LANES, Ldlt};
+use crate::linalg::LANES;
 use crate::real::{abs, from_u32, lit, sqrt};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock};
-use crate::refine::lm::{Manifold, normal_equations};
 use crate::refine::relative_pose::PoseModel;
-use crate::robust::loss::Loss;
 use crate::robust::{
     Consensus, Estimator, Gate, Guide, Progress, RansacOptions, RansacReport, Score, ScoreCounts, StopReason,
     iterations_needed, rank_by_score, ransac,
@@ -29,10 +27,9 @@ use crate::solvers::{relpose_upright_3pt, translation_2pt};
 
 /// Blocks of the correspondences on which hypotheses are polished.
 const SUBSET: usize = 8;
-/// Gauss-Newton steps of a hypothesis on them.
-const POLISH_PASSES: u32 = 2;
-/// Passes over the data in a local optimisation.
-const LOCAL_PASSES: u32 = 6;
+/// Steps of a local optimisation, and where it truncates the errors over the threshold.
+const LOCAL_STEPS: u32 = 3;
+const LOCAL_WIDTH: f64 = 1.25;
 /// The wide threshold is the narrow one and so many standard deviations of the prior.
 const WIDE_SIGMAS: f64 = 1.0;
 /// Where wrong correspondences lie within the wide threshold more often than this, the prior is too vague to sample by.
@@ -174,20 +171,9 @@ impl<T: Real, B: EpipolarBlock<T>, K: Minimal<T, S>, const S: usize> Estimator<T
     fn polish(&self, model: &PoseModel<T>, counts: &mut ScoreCounts) -> Option<PoseModel<T>> {
         let subset = self.subset(model);
         let data = BlockSlice { blocks: &subset, count: self.count };
-        let mut model = *model;
-        let mut threshold = self.wide;
-        // Gauss-Newton steps with a falling threshold.
-        for pass in 0..POLISH_PASSES {
-            counts.residuals += self.count as u64;
-            let mut sums = normal_equations(data, &model, &Loss::Truncated(threshold));
-            if pass == 0 && sums.active < self.support {
-                return None;
-            }
-            self.problem.add_prior(&mut sums, &model);
-            model = model.retract(&-Ldlt::new(&sums.hessian)?.solve(&sums.gradient));
-            threshold *= T::HALF;
-        }
-        Some(model)
+        let (residuals, wide) = (&mut counts.residuals, self.wide);
+        let model = self.problem.approach(data, model, wide, 1, self.support, residuals)?;
+        self.problem.approach(data, &model, wide * T::HALF, 1, 5, residuals)
     }
 
     fn score(&self, model: &PoseModel<T>, gate: &Gate<T>, counts: &mut ScoreCounts) -> Option<Score<T>> {
@@ -196,10 +182,8 @@ impl<T: Real, B: EpipolarBlock<T>, K: Minimal<T, S>, const S: usize> Estimator<T
 
     fn refine(&self, model: &PoseModel<T>, residuals: &mut u64) -> Option<PoseModel<T>> {
         // A polished model needs no wide stage.
-        let loss = Loss::Tukey(self.problem.threshold * T::TWO);
-        let minimum = self.problem.optimise(model, &loss, LOCAL_PASSES, lit(1e-3));
-        *residuals += minimum.passes as u64 * self.problem.data.count as u64;
-        Some(minimum.model)
+        let problem = &self.problem;
+        problem.approach(problem.data, model, problem.threshold * lit(LOCAL_WIDTH), LOCAL_STEPS, 5, residuals)
     }
 }
 

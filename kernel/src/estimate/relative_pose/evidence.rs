@@ -5,7 +5,8 @@
 //! By count: correspondences that it leaves unexplained agree with the pose more often than chance. Of `m` unexplained
 //! ones `k` agree; a wrong one agrees with the probability `p`, the share of the image within the threshold of an
 //! epipolar line; the pose has two degrees of freedom left once the simpler model is given, so that the expected number
-//! of accidents as good as this is at most `C(m, 2) P(B(m - 2, p) >= k - 2)`: it must be below 0.01.
+//! of accidents as good as this is at most `C(m, 2) P(B(m - 2, p) >= k - 2)`: it must be below 0.01, against a rotation
+//! below 0.0001 (where parallax is hardly visible, a general pose has no direction).
 //!
 //! By scatter: on the correspondences that it does explain, the squared error across the epipolar lines is what noise
 //! is, and the one along them must not be larger: the logarithm of the ratio of both has a known deviation.
@@ -21,16 +22,13 @@
 //! P. Torr, "An assessment of information criteria for motion model selection", CVPR 1997 (the models and their
 //! degrees of freedom).
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 
 use crate::Real;
-use crate::geometry::pose::nearest_rotation;
 use crate::linalg::LANES;
 use crate::real::{from_u32, lit, ln, max, min, sqrt};
 use crate::refine::blocks::EpipolarBlock;
-use crate::refine::homography::{RotationModel, transfer_sq};
-use crate::refine::lm::Manifold;
-use crate::refine::relative_pose::PoseModel;
+use crate::refine::homography::transfer_sq;
 
 use super::super::chance::{EXPLAINED_SIGMAS, beyond_chance_with};
 use super::hypothesis::PoseProblem;
@@ -94,7 +92,13 @@ impl<T: Real, B: EpipolarBlock<T>> Evidence<'_, '_, T, B> {
     }
 
     /// True where the data prove parallax against a simpler model with `parameters` degrees of freedom.
-    pub(super) fn proves_parallax(&self, count: u32, explained: &Explained<T>, parameters: u32) -> bool {
+    pub(super) fn proves_parallax(
+        &self,
+        count: u32,
+        explained: &Explained<T>,
+        parameters: u32,
+        accidents: f64,
+    ) -> bool {
         let n = explained.all;
         if n <= parameters {
             return true;
@@ -107,7 +111,7 @@ impl<T: Real, B: EpipolarBlock<T>> Evidence<'_, '_, T, B> {
         let deviations =
             if along > across { ln(along / across) * sqrt(from_u32(n)) * T::HALF } else { T::ZERO };
         let unexplained = count.saturating_sub(n);
-        beyond_chance_with(unexplained, explained.others, 2, self.accident, deviations)
+        beyond_chance_with(unexplained, explained.others, 2, self.accident, deviations, accidents)
     }
 
     /// True where the pose's epipolar lines fit what `x2 ~ H x1` explains far better than those of the plane's own pose
@@ -129,39 +133,5 @@ impl<T: Real, B: EpipolarBlock<T>> Evidence<'_, '_, T, B> {
             }
         }
         gain * self.sigma * self.sigma > lit::<T>(CHANCE_GAIN) * noise * noise
-    }
-
-    /// The rotation that explains the inliers best, by alternating between the closest rotation of all that are
-    /// explained and the choice of those; none where they leave one open.
-    pub(super) fn rotation(&self, start: &PoseModel<T>) -> Option<RotationModel<T>> {
-        let mut model = RotationModel { rotation: start.rotation, scales: start.scales };
-        let mut limit: T = T::MAX;
-        // From coarse to fine, so that a few wrong ones do not hold the rest.
-        for factor in [64, 24, 12, 8, 5, 5] {
-            let h = model.matrix();
-            let mut moment = Matrix3::zeros();
-            let mut mask = self.inliers.iter();
-            let (s1, s2) = (start.scales.inverse1(), start.scales.inverse2());
-            for block in self.problem.data.blocks {
-                let (plane, weight) = block.planes();
-                let squared = transfer_sq(&h, &plane, &weight);
-                let (f1, f2) = block.directions();
-                for (l, &inlier) in (0..LANES).zip(mask.by_ref()) {
-                    if inlier && squared[l] < limit {
-                        let unit = |x: T, y: T, z: T| {
-                            let v = Vector3::new(x, y, z);
-                            v * (T::ONE / sqrt(v.norm_squared()))
-                        };
-                        let v1 = unit(f1[0][l] * s1[0], f1[1][l] * s1[1], f1[2][l]);
-                        let v2 = unit(f2[0][l] * s2[0], f2[1][l] * s2[1], f2[2][l]);
-                        moment += v2 * v1.transpose();
-                    }
-                }
-            }
-            model.rotation = nearest_rotation(&moment)?;
-            let factor: T = from_u32(factor);
-            limit = factor * factor * self.sigma * self.sigma;
-        }
-        Some(model)
     }
 }

@@ -4,15 +4,18 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::Real;
 use crate::geometry::Essential;
-use crate::linalg::{LANES, Lanes};
+use crate::geometry::pose::nearest_rotation;
+use crate::linalg::{LANES, Lanes, Ldlt};
 use crate::real::{abs, from_u32, lit, sqrt};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock};
-use crate::refine::lm::{Manifold, Minimum, NormalEquations, descend, normal_equations};
+use crate::refine::homography::{RotationModel, transfer_sq};
+use crate::refine::lm::{Manifold, Minimum, NormalEquations, descend, normal_equations, sampled_equations};
 use crate::refine::relative_pose::{PoseModel, Scales};
 use crate::robust::loss::Loss;
 use crate::robust::{Estimator, Gate, Score, ScoreCounts, Tally};
 use crate::solvers::relpose_5pt;
 
+use super::super::chance::EXPLAINED_SIGMAS;
 use super::super::stride;
 use super::prior::KnownRotation;
 
@@ -32,11 +35,17 @@ pub(super) struct PoseProblem<'a, T: Real, B> {
 
 /// Blocks scored between two looks at the gate.
 const CHUNK: usize = 2;
-/// Passes over the data in the two stages of a local optimisation.
-const WIDE_PASSES: u32 = 5;
-const LOCAL_PASSES: u32 = 10;
+/// Steps of the two stages of a local optimisation.
+const WIDE_STEPS: u32 = 2;
+const LOCAL_STEPS: u32 = 3;
 /// The first stage's threshold over the second's.
 const WIDE: f64 = 3.0;
+/// A stage ends with a step that promises less than this share of the cost.
+const CONVERGED: f64 = 0.01;
+/// Blocks that a local optimisation looks at.
+pub(super) const SAMPLED_BLOCKS: usize = 64;
+/// Blocks on which it is tried whether a pose is but a rotation.
+const TURNED_BLOCKS: usize = 16;
 /// Rays closer to parallel than this many thresholds say nothing about depth.
 const PARALLEL: f64 = 1.0;
 
@@ -107,6 +116,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         let full = blocks.get(..self.data.count / LANES).unwrap_or(blocks);
         let (mut hits, mut seen) = (0u32, 0u32);
         let half = full.len() / 2;
+        let every = core::cmp::max(full.len() / SAMPLED_BLOCKS, 1);
         for shift in [self.stride, half, self.stride / 2] {
             // Blocks of the list and of the list turned by `shift`, but not a block with itself.
             let shift = if shift < full.len() { shift } else { 0 };
@@ -114,7 +124,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
                 continue;
             }
             let (start, end) = full.split_at_checked(shift).unwrap_or((full, &[]));
-            for (block, other) in full.iter().zip(end.iter().chain(start)) {
+            for (block, other) in full.iter().zip(end.iter().chain(start)).step_by(every) {
                 let squared = self.squared_in_front(&block.mispaired(other), model, &view);
                 for s in squared {
                     hits += (s < T::ONE) as u32;
@@ -124,6 +134,104 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         }
         let share = from_u32::<T>(hits + 2) / from_u32(seen + 2);
         if seen > 0 && share > least { share } else { least }
+    }
+
+    /// The rotation that explains the inliers of a pose best, by alternating between the closest rotation of all that are
+    /// explained and the choice of those, on so many of the `blocks`; none where they leave one open, or where less than half
+    /// of them turn.
+    pub(super) fn rotation(&self, pose: &PoseModel<T>, sigma: T, blocks: usize) -> Option<RotationModel<T>> {
+        let every = core::cmp::max(self.data.blocks.len().div_ceil(blocks), 1);
+        let view = self.view(pose);
+        let mut model = RotationModel { rotation: pose.rotation, scales: pose.scales };
+        let (s1, s2) = (pose.scales.inverse1(), pose.scales.inverse2());
+        let mut limit: T = T::MAX;
+        // From coarse to fine, so that a few wrong ones do not hold the rest.
+        for factor in [64.0, 24.0, 12.0, 8.0, 5.0, 5.0] {
+            let h = model.matrix();
+            let mut moment = Matrix3::zeros();
+            let (mut inliers, mut turned) = (0u32, 0u32);
+            let mut left = self.data.count;
+            for block in self.data.blocks.iter().step_by(every) {
+                let residual = self.squared(block, &view.matrix, view.scale);
+                let (plane, weight) = block.planes();
+                let squared = transfer_sq(&h, &plane, &weight);
+                let (f1, f2) = block.directions();
+                for l in 0..LANES {
+                    let inlier = l < left && residual[l] < T::ONE;
+                    inliers += inlier as u32;
+                    if inlier && squared[l] < limit {
+                        turned += 1;
+                        let v1 = Vector3::new(f1[0][l] * s1[0], f1[1][l] * s1[1], f1[2][l]);
+                        let v2 = Vector3::new(f2[0][l] * s2[0], f2[1][l] * s2[1], f2[2][l]);
+                        moment += v2 * v1.transpose();
+                    }
+                }
+                left = left.saturating_sub(LANES * every);
+            }
+            if 2 * turned < inliers {
+                return None;
+            }
+            model.rotation = nearest_rotation(&moment)?;
+            let factor: T = lit(factor);
+            limit = factor * factor * sigma * sigma;
+        }
+        Some(model)
+    }
+
+    /// True where a rotation explains what a pose does: then the optima of poses are many, and none is better than the
+    /// others.
+    fn turns(&self, pose: &PoseModel<T>) -> bool {
+        let every = core::cmp::max(self.data.blocks.len().div_ceil(TURNED_BLOCKS), 1);
+        // A threshold is two standard deviations.
+        let Some(rotation) = self.rotation(pose, self.threshold * T::HALF, TURNED_BLOCKS) else {
+            return false;
+        };
+        let limit = self.threshold * self.threshold * lit(EXPLAINED_SIGMAS * EXPLAINED_SIGMAS * 0.25);
+        let h = rotation.matrix();
+        let view = self.view(pose);
+        let (mut inliers, mut turned) = (0u32, 0u32);
+        let mut left = self.data.count;
+        for block in self.data.blocks.iter().step_by(every) {
+            let residual = self.squared(block, &view.matrix, view.scale);
+            let (plane, weight) = block.planes();
+            let squared = transfer_sq(&h, &plane, &weight);
+            for l in 0..LANES {
+                let inlier = l < left && residual[l] < T::ONE;
+                inliers += inlier as u32;
+                turned += (inlier && squared[l] < limit) as u32;
+            }
+            left = left.saturating_sub(LANES * every);
+        }
+        turned * 10 >= inliers * 9
+    }
+
+    /// At most `steps` Gauss-Newton steps towards the minimum of the errors truncated at `threshold`, on some of the blocks,
+    /// without a look at where the last one leads; none where fewer than `least` are active or a direction is open.
+    pub(super) fn approach(
+        &self,
+        data: BlockSlice<'_, B>,
+        model: &PoseModel<T>,
+        threshold: T,
+        steps: u32,
+        least: u32,
+        residuals: &mut u64,
+    ) -> Option<PoseModel<T>> {
+        let every = data.blocks.len().div_ceil(SAMPLED_BLOCKS);
+        let mut model = *model;
+        for _ in 0..steps {
+            let mut sums = sampled_equations(data, every, &model, &Loss::Truncated(threshold));
+            *residuals += (data.count / core::cmp::max(every, 1)) as u64;
+            if sums.active < least {
+                return None;
+            }
+            self.add_prior(&mut sums, &model);
+            let step = -Ldlt::new(&sums.hessian)?.solve(&sums.gradient);
+            model = model.retract(&step);
+            if -step.dot(&sums.gradient) <= sums.cost * lit(CONVERGED) {
+                break;
+            }
+        }
+        Some(model)
     }
 
     /// The model that minimises a loss, from `model`.
@@ -221,12 +329,13 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
 
     fn refine(&self, model: &PoseModel<T>, residuals: &mut u64) -> Option<PoseModel<T>> {
         // A minimal model is off by more than the noise: inliers are gathered from three times the threshold first.
-        let wide = Loss::Truncated(self.threshold * lit(WIDE));
-        let first = self.optimise(model, &wide, WIDE_PASSES, lit(1e-3));
-        let loss = Loss::Truncated(self.threshold);
-        let minimum = self.optimise(&first.model, &loss, LOCAL_PASSES, lit(1e-4));
-        *residuals += (first.passes + minimum.passes) as u64 * self.data.count as u64;
-        Some(minimum.model)
+        let wide = self.threshold * lit(WIDE);
+        let near = self.approach(self.data, model, wide, WIDE_STEPS, 5, residuals)?;
+        self.approach(self.data, &near, self.threshold, LOCAL_STEPS, 5, residuals)
+    }
+
+    fn settles(&self, model: &PoseModel<T>) -> bool {
+        self.turns(model)
     }
 }
 

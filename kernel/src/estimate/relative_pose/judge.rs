@@ -2,11 +2,11 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::super::chance::{EXPLAINED_SIGMAS, beyond_chance, line_accident};
+use super::super::chance::{ACCIDENTS, EXPLAINED_SIGMAS, beyond_chance, line_accident};
 use super::super::degenerate::{few_distinct, list, on_a_line};
 use super::covariance::{PsiSums, Spread, covariance, variance};
 use super::evidence::{Evidence, Explained};
-use super::hypothesis::PoseProblem;
+use super::hypothesis::{PoseProblem, SAMPLED_BLOCKS};
 use super::verdict::{GeneralMotion, PureRotation, RelativePoseVerdict, Unobservable};
 use crate::Real;
 use crate::geometry::Pose;
@@ -44,6 +44,9 @@ const PLANE_THRESHOLD: f64 = 1.25;
 /// A plane must explain so many in twenty of the pose's inliers to be the verdict; of a planar scene it explains all but
 /// accidents.
 const PLANE_SHARE_OF_20: u32 = 17;
+/// Accidents expected at the most where parallax counts as proven against a rotation: where it is hardly visible a general
+/// pose has no direction, so that little is lost.
+const ROTATION_ACCIDENTS: f64 = 1e-4;
 /// Of a scene that stands still at the most one inlier in as many moves by twice the least motion.
 const MOVED_ONE_IN: u32 = 10;
 /// Inliers of which a line is believed where they agree with a pose no better than chance.
@@ -119,14 +122,14 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
             let still = RotationModel { rotation: Matrix3::identity(), scales: problem.scales };
             return self.turned(&still, true, self.least_motion / lit(EXPLAINED_SIGMAS), mask);
         }
-        if let Some(rotation) = evidence.rotation(&refined) {
+        if let Some(rotation) = problem.rotation(&refined, sigma, SAMPLED_BLOCKS) {
             let explained = evidence.explained(&rotation.matrix());
-            if !evidence.proves_parallax(count, &explained, 3) {
+            if !evidence.proves_parallax(count, &explained, 3, ROTATION_ACCIDENTS) {
                 let still = self.stands_still(&evidence, &rotation, &explained);
                 return self.turned(&rotation, still, sigma, mask);
             }
         }
-        if let Some(plane) = self.plane(indices, sigma)
+        if let Some(plane) = self.plane(&refined, indices, sigma)
             && 2 * evidence.explained(&plane.0).inliers > inliers
         {
             // A plane that holds most inliers may have led to the wrong one of its two poses.
@@ -146,7 +149,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                 let twin = pose_model(&twin.pose, problem).matrix();
                 !evidence.bends(&plane.0, &twin, max(noise, sigma * T::HALF))
             });
-            if share && plane_stands && !evidence.proves_parallax(count, &explained, 8) {
+            if share && plane_stands && !evidence.proves_parallax(count, &explained, 8, ACCIDENTS) {
                 return self.planar(&plane, twins, sigma, mask);
             }
         }
@@ -156,7 +159,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     /// The pose that all inliers support, with what lies just beyond the threshold at a falling weight.
     pub(super) fn refine(&self, model: &PoseModel<T>) -> PoseModel<T> {
         let loss = Loss::Tukey(self.problem.threshold * T::TWO);
-        self.problem.optimise(model, &loss, 10, lit(1e-6)).model
+        self.problem.optimise(model, &loss, 10, lit(1e-5)).model
     }
 
     /// A pose refined from a caller's; none where too few agree with it to fix it. Writes the inlier mask.
@@ -274,7 +277,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
 
     /// No motion, or a refined rotation.
     fn turned(&self, rotation: &RotationModel<T>, still: bool, sigma: T, mask: &mut [bool]) -> Judgement<T> {
-        let problem = self.transfer_problem(sigma * lit(EXPLAINED_SIGMAS), None);
+        let problem = self.transfer_problem(sigma * lit(EXPLAINED_SIGMAS));
         let model = if still {
             RotationModel { rotation: Matrix3::identity(), scales: rotation.scales }
         } else {
@@ -297,12 +300,8 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         Judgement { verdict, noise: sqrt(variance) }
     }
 
-    pub(super) fn transfer_problem<'c>(
-        &'c self,
-        threshold: T,
-        subset: Option<&'c [u32]>,
-    ) -> TransferProblem<'c, T, B> {
-        TransferProblem { data: self.problem.data, threshold, subset }
+    pub(super) fn transfer_problem(&self, threshold: T) -> TransferProblem<'_, T, B> {
+        TransferProblem { data: self.problem.data, threshold, subset: None }
     }
 }
 
