@@ -51,11 +51,11 @@ pub(super) fn beyond_chance_with<T: Real>(
     freedom: u32,
     p: T,
     deviations: T,
-    accidents: f64,
+    accidents: T,
 ) -> bool {
     let by_count = min(ln_accidents(count, agreeing, freedom, p), T::ZERO);
     let z = max(deviations, T::ZERO);
-    by_count - z * z * T::HALF < ln(lit(accidents))
+    by_count - z * z * T::HALF < ln(accidents)
 }
 
 /// The chance of a wrong correspondence to lie within `threshold` of an epipolar line by the Sampson error: the area of

@@ -47,8 +47,8 @@ pub trait Estimator<T: Real, const S: usize> {
     fn refine(&self, model: &Self::Model, residuals: &mut u64) -> Option<Self::Model>;
 
     /// True where more samples would lead to a model that is no better than this one, the best so far, for what all of
-    /// them tell: then [`DISCOVERIES`](Self::DISCOVERIES) asks for no more.
-    fn settles(&self, _model: &Self::Model) -> bool {
+    /// them tell: then [`DISCOVERIES`](Self::DISCOVERIES) asks for no more. Adds the residuals evaluated.
+    fn settles(&self, _model: &Self::Model, _residuals: &mut u64) -> bool {
         false
     }
 

@@ -19,6 +19,7 @@ use crate::linalg::LANES;
 use crate::real::{abs, from_u32, lit, sqrt};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock};
 use crate::refine::relative_pose::PoseModel;
+use crate::robust::loss::Loss;
 use crate::robust::{
     Consensus, Estimator, Gate, Guide, Progress, RansacOptions, RansacReport, Score, ScoreCounts, StopReason,
     iterations_needed, rank_by_score, ransac,
@@ -27,9 +28,8 @@ use crate::solvers::{relpose_upright_3pt, translation_2pt};
 
 /// Blocks of the correspondences on which hypotheses are polished.
 const SUBSET: usize = 8;
-/// Steps of a local optimisation, and where it truncates the errors over the threshold.
-const LOCAL_STEPS: u32 = 3;
-const LOCAL_WIDTH: f64 = 1.25;
+/// Passes over the data in a local optimisation.
+const LOCAL_PASSES: u32 = 6;
 /// The wide threshold is the narrow one and so many standard deviations of the prior.
 const WIDE_SIGMAS: f64 = 1.0;
 /// Where wrong correspondences lie within the wide threshold more often than this, the prior is too vague to sample by.
@@ -182,8 +182,10 @@ impl<T: Real, B: EpipolarBlock<T>, K: Minimal<T, S>, const S: usize> Estimator<T
 
     fn refine(&self, model: &PoseModel<T>, residuals: &mut u64) -> Option<PoseModel<T>> {
         // A polished model needs no wide stage.
-        let problem = &self.problem;
-        problem.approach(problem.data, model, problem.threshold * lit(LOCAL_WIDTH), LOCAL_STEPS, 5, residuals)
+        let loss = Loss::Tukey(self.problem.threshold * T::TWO);
+        let minimum = self.problem.optimise(model, &loss, LOCAL_PASSES, lit(1e-3));
+        *residuals += minimum.passes as u64 * self.problem.data.count as u64;
+        Some(minimum.model)
     }
 }
 

@@ -97,7 +97,7 @@ impl<T: Real, B: EpipolarBlock<T>> Evidence<'_, '_, T, B> {
         count: u32,
         explained: &Explained<T>,
         parameters: u32,
-        accidents: f64,
+        accidents: T,
     ) -> bool {
         let n = explained.all;
         if n <= parameters {

@@ -46,6 +46,11 @@ const CONVERGED: f64 = 0.01;
 pub(super) const SAMPLED_BLOCKS: usize = 64;
 /// Blocks on which it is tried whether a pose is but a rotation.
 const TURNED_BLOCKS: usize = 16;
+/// Passes over those at the most.
+const TURN_PASSES: u64 = TURN_SIGMAS.len() as u64 + 1;
+/// Errors, in standard deviations, up to which correspondences take part in the next rotation: from coarse to fine, so that
+/// a few wrong ones do not hold the rest.
+const TURN_SIGMAS: [u32; 6] = [64, 24, 12, 8, 5, 5];
 /// Rays closer to parallel than this many thresholds say nothing about depth.
 const PARALLEL: f64 = 1.0;
 
@@ -140,13 +145,12 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
     /// explained and the choice of those, on so many of the `blocks`; none where they leave one open, or where less than half
     /// of them turn.
     pub(super) fn rotation(&self, pose: &PoseModel<T>, sigma: T, blocks: usize) -> Option<RotationModel<T>> {
-        let every = core::cmp::max(self.data.blocks.len().div_ceil(blocks), 1);
+        let every = core::cmp::max(self.data.blocks.len().div_ceil(core::cmp::max(blocks, 1)), 1);
         let view = self.view(pose);
         let mut model = RotationModel { rotation: pose.rotation, scales: pose.scales };
         let (s1, s2) = (pose.scales.inverse1(), pose.scales.inverse2());
         let mut limit: T = T::MAX;
-        // From coarse to fine, so that a few wrong ones do not hold the rest.
-        for factor in [64.0, 24.0, 12.0, 8.0, 5.0, 5.0] {
+        for factor in TURN_SIGMAS {
             let h = model.matrix();
             let mut moment = Matrix3::zeros();
             let (mut inliers, mut turned) = (0u32, 0u32);
@@ -172,7 +176,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
                 return None;
             }
             model.rotation = nearest_rotation(&moment)?;
-            let factor: T = lit(factor);
+            let factor: T = from_u32(factor);
             limit = factor * factor * sigma * sigma;
         }
         Some(model)
@@ -334,7 +338,8 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
         self.approach(self.data, &near, self.threshold, LOCAL_STEPS, 5, residuals)
     }
 
-    fn settles(&self, model: &PoseModel<T>) -> bool {
+    fn settles(&self, model: &PoseModel<T>, residuals: &mut u64) -> bool {
+        *residuals += TURN_PASSES * core::cmp::min(TURNED_BLOCKS * LANES, self.data.count) as u64;
         self.turns(model)
     }
 }

@@ -124,7 +124,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         }
         if let Some(rotation) = problem.rotation(&refined, sigma, SAMPLED_BLOCKS) {
             let explained = evidence.explained(&rotation.matrix());
-            if !evidence.proves_parallax(count, &explained, 3, ROTATION_ACCIDENTS) {
+            if !evidence.proves_parallax(count, &explained, 3, lit(ROTATION_ACCIDENTS)) {
                 let still = self.stands_still(&evidence, &rotation, &explained);
                 return self.turned(&rotation, still, sigma, mask);
             }
@@ -149,7 +149,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                 let twin = pose_model(&twin.pose, problem).matrix();
                 !evidence.bends(&plane.0, &twin, max(noise, sigma * T::HALF))
             });
-            if share && plane_stands && !evidence.proves_parallax(count, &explained, 8, ACCIDENTS) {
+            if share && plane_stands && !evidence.proves_parallax(count, &explained, 8, lit(ACCIDENTS)) {
                 return self.planar(&plane, twins, sigma, mask);
             }
         }

@@ -83,9 +83,9 @@ pub type RelativePoseError = TwoViewError;
 /// of the points of the plane z = 1) by the pixels; refined on their inliers with five degrees of freedom. Then the
 /// simplest of no motion, a rotation, a plane and a general motion that the data leave standing is the verdict: a
 /// simpler model falls where correspondences that it does not explain agree with the pose more often than chance (at most
-/// 0.01 accidents expected, 0.0001 against a rotation; the chance is measured on mispaired correspondences), or where the errors along the epipolar
-/// lines are larger than those across. A model explains what lies within 5 sigma, where sigma is the larger of the
-/// option's and of the one that the residuals show.
+/// 0.01 accidents expected, 0.0001 against a rotation; the chance is measured on mispaired correspondences), or where the
+/// errors along the epipolar lines are larger than those across. A model explains what lies within 5 sigma, where sigma is
+/// the larger of the option's and of the one that the residuals show.
 ///
 /// With a [`RelativePosePrior`] the hypotheses come from three correspondences and the vertical, or from two and the
 /// rotation; each is polished on a few correspondences within a threshold as wide as the prior's uncertainty, and the
@@ -114,7 +114,8 @@ pub type RelativePoseError = TwoViewError;
 ///
 /// # Cost
 /// At most `max_iterations` samples, by itself as many as the confidence needs for the inliers found; beyond a budget of
-/// residuals at most one refinement (five passes, over 256 correspondences at the most, and the scores before and after it),
+/// residuals at most one refinement (five passes over 256 correspondences at the most, one score, which is two passes over
+/// all, and seven over 64 to try a rotation),
 /// and the verdict's passes. A budget of fewer than 2 n residuals, of 4 n with a prior, scores nothing. At half outliers a prior takes
 /// less than a third of the samples and of the time; a contradicted one costs its own search, of as many samples as a
 /// fifth of inliers needs, and one more verdict.
