@@ -143,8 +143,6 @@ impl<T: Real, B: EpipolarBlock<T>, K: Minimal<T, S>, const S: usize> Estimator<T
 {
     type Model = PoseModel<T>;
 
-    // A polished model is near the optimum already.
-    const NEAR_MISSES: u32 = 5;
     // The subset is looked at twice before.
     const SCORE_PASSES: u32 = 4;
 
