@@ -5,10 +5,10 @@ use nalgebra::SMatrix;
 use crate::Real;
 use crate::real::{abs, is_finite, max};
 
+pub(crate) mod batch;
 pub(crate) mod conic;
 mod cubic;
 mod eigen;
-pub(crate) mod four;
 mod lanes;
 mod ldlt;
 mod least_singular3;

@@ -7,7 +7,7 @@
 //! for on both sides of the extremum between them. Newton's iteration, kept inside its bracket, does the rest.
 
 use crate::Real;
-use crate::linalg::four::Four;
+use crate::linalg::batch::{BATCH, Batch};
 use crate::real::{abs, lit, sqrt};
 
 /// Coefficients of a polynomial of degree 10.
@@ -133,7 +133,7 @@ pub fn projective_roots_10<T: Real>(c: &[T; 11], error: T) -> [RealRoots10<T>; 2
     let mut reversed = *c;
     reversed.reverse();
     // Both charts must agree on the sign at 1 and -1, or a root there would be found twice or never.
-    let ends = [T::ONE, -T::ONE].map(|side| bernstein(c, side)[10]);
+    let ends = [bernstein(c, T::ONE)[10], bernstein(c, -T::ONE)[10]];
     [roots_in_chart(c, error, Some(ends)), roots_in_chart(&reversed, error, Some(ends))]
 }
 
@@ -147,7 +147,7 @@ fn roots_in_chart<T: Real>(c: &Coefficients<T>, error: T, ends: Option<[T; 2]>) 
     let none = Bracket { lo: T::ZERO, hi: T::ZERO, positive: false, guess: T::ZERO };
     let worst = LeastDetermined { x: T::ZERO, spread: T::ZERO };
     let mut brackets = Brackets { list: [none; CAPACITY], len: 0, worst };
-    let mut waiting = [(*c, T::ZERO, T::ONE); MAX_DEPTH + 1];
+    let mut waiting = [(*c, T::ZERO, T::ONE); MAX_DEPTH];
     for k in 0..2 {
         let side = if k == 0 { T::ONE } else { -T::ONE };
         let mut b = bernstein(c, side);
@@ -156,7 +156,7 @@ fn roots_in_chart<T: Real>(c: &Coefficients<T>, error: T, ends: Option<[T; 2]>) 
         }
         isolate(c, side, b, error, &mut waiting, &mut brackets);
     }
-    polish(c, &brackets, error)
+    polish::<T, BATCH>(c, &brackets, error)
 }
 
 /// Bernstein coefficients on [0, 1] of the polynomial in `t = side * x`.
@@ -190,20 +190,24 @@ fn bernstein<T: Real>(c: &Coefficients<T>, side: T) -> Coefficients<T> {
     b
 }
 
-/// The halves of an interval (de Casteljau, by additions; the powers of two are put right at the end).
+/// Leaves the left half of an interval in `b` and writes the right one (de Casteljau, by additions; the powers of two are
+/// put right at the end).
 #[inline]
-fn halves<T: Real>(b: &Coefficients<T>) -> [Coefficients<T>; 2] {
-    let (mut v, mut left, mut right) = (*b, *b, *b);
+fn halve<T: Real>(b: &mut Coefficients<T>, right: &mut Coefficients<T>) {
+    *right = *b;
     let mut scale = T::ONE;
     for level in 1..11 {
         for i in 0..11 - level {
-            v[i] += v[i + 1];
+            right[i] += right[i + 1];
         }
         scale *= T::HALF;
-        left[level] = v[0] * scale;
-        right[10 - level] = v[10 - level] * scale;
+        b[level] = right[0] * scale;
     }
-    [left, right]
+    scale = T::ONE;
+    for i in (0..10).rev() {
+        scale *= T::HALF;
+        right[i] *= scale;
+    }
 }
 
 /// How often neighbours differ in sign; zero counts as positive.
@@ -217,7 +221,7 @@ fn sign_changes<T: Real>(b: &[T]) -> u32 {
 }
 
 /// Depth first; what waits is the right half of each level.
-type Waiting<T> = [(Coefficients<T>, T, T); MAX_DEPTH + 1];
+type Waiting<T> = [(Coefficients<T>, T, T); MAX_DEPTH];
 
 #[inline]
 fn isolate<T: Real>(
@@ -246,14 +250,13 @@ fn isolate<T: Real>(
             {
                 pair(c, side, lo, lo + width, positive, error, found);
             } else {
-                let [left, right] = halves(&b);
                 width *= T::HALF;
-                if let Some(slot) = waiting.get_mut(count) {
-                    *slot = (right, lo + width, width);
+                if let Some((right, start, length)) = waiting.get_mut(count) {
+                    halve(&mut b, right);
+                    (*start, *length) = (lo + width, width);
                     count += 1;
+                    continue;
                 }
-                b = left;
-                continue;
             }
         }
         let Some(next) = count.checked_sub(1) else { return };
@@ -363,41 +366,43 @@ fn value_and_derivatives<T: Real>(c: &Coefficients<T>, x: T) -> (T, T, T) {
     (f, d, h)
 }
 
-/// Newton's iteration, four roots side by side, halving a bracket wherever Newton leaves it.
+/// Newton's iteration, `L` roots side by side, halving a bracket wherever Newton leaves it.
 #[inline]
-fn polish<T: Real>(c: &Coefficients<T>, brackets: &Brackets<T>, error: T) -> RealRoots10<T> {
+fn polish<T: Real, const L: usize>(c: &Coefficients<T>, brackets: &Brackets<T>, error: T) -> RealRoots10<T> {
     let (mut roots, mut worst) = ([T::ZERO; CAPACITY], brackets.worst);
-    let groups = roots.chunks_exact_mut(4).zip(brackets.list.chunks_exact(4));
+    let groups = roots.chunks_exact_mut(L).zip(brackets.list.chunks_exact(L));
     let mut left = brackets.len;
-    for (out, group) in groups.take(brackets.len.div_ceil(4)) {
-        let &[g0, g1, g2, g3] = group else { continue };
-        let group = [g0, g1, g2, g3];
-        let (mut lo, mut hi) = (group.map(|g| g.lo), group.map(|g| g.hi));
-        let positive = group.map(|g| g.positive);
-        let mut x = group.map(|g| g.guess);
-        let mut slope = [T::ONE; 4];
+    for (out, group) in groups.take(brackets.len.div_ceil(L)) {
+        let Ok(group) = <&[Bracket<T>; L]>::try_from(group) else { continue };
+        let (mut x, mut slope) = ([T::ZERO; L], [T::ONE; L]);
+        let (mut lo, mut hi, mut arrived) = ([T::ZERO; L], [T::ZERO; L], [false; L]);
+        for k in 0..L {
+            (x[k], lo[k], hi[k]) = (group[k].guess, group[k].lo, group[k].hi);
+        }
         for _ in 0..NEWTON {
-            let at = Four(x);
-            let (mut f, mut d) = (Four::splat(c[10]), Four::splat(T::ZERO));
+            let at = Batch(x);
+            let (mut f, mut d) = (Batch::splat(c[10]), Batch::splat(T::ZERO));
             for i in (0..10).rev() {
                 d = d * at + f;
-                f = f * at + Four::splat(c[i]);
+                f = f * at + Batch::splat(c[i]);
             }
             let newton = (at - f / d).0;
-            slope = d.0;
-            let mut moved = T::ZERO;
-            for k in 0..4 {
-                let before = (f.0[k] >= T::ZERO) == positive[k];
+            let mut all = true;
+            for k in 0..L {
+                let before = (f.0[k] >= T::ZERO) == group[k].positive;
                 lo[k] = if before { x[k] } else { lo[k] };
                 hi[k] = if before { hi[k] } else { x[k] };
                 let inside = newton[k] >= lo[k] && newton[k] <= hi[k];
                 let next = if inside { newton[k] } else { (lo[k] + hi[k]) * T::HALF };
-                let step = abs(next - x[k]);
-                moved = if step > moved { step } else { moved };
-                x[k] = next;
+                let step = next - x[k];
+                // A root that has arrived waits for the others of its group: it must not depend on them.
+                x[k] = if arrived[k] { x[k] } else { next };
+                slope[k] = if arrived[k] { slope[k] } else { d.0[k] };
+                // The next step would be of the order of the square.
+                arrived[k] |= step * step <= T::EPSILON * lit(0.25);
+                all &= arrived[k];
             }
-            // The next step would be of the order of the square.
-            if moved * moved <= T::EPSILON * lit(0.25) {
+            if all {
                 break;
             }
         }
@@ -405,7 +410,7 @@ fn polish<T: Real>(c: &Coefficients<T>, brackets: &Brackets<T>, error: T) -> Rea
             *slot = x;
             worst.see(x, error / abs(d));
         }
-        left = left.saturating_sub(4);
+        left = left.saturating_sub(L);
     }
     RealRoots10 { roots, len: brackets.len, worst }
 }

@@ -4,144 +4,161 @@
 use super::cubics::Cubic;
 use super::polish::{cross, norm_sq, select};
 use crate::Real;
-use crate::linalg::four::Four;
+use crate::linalg::batch::Batch;
 use crate::real::{abs, sqrt};
 
-/// `x * row.x(z) + y * row.y(z) + row.one(z) = 0`, coefficients from z^0 upwards.
+/// `x * row.x(z) + y * row.y(z) + row.one(z) = 0`: the coefficients of the two cubics and the quartic, each from z^0
+/// upwards, one after the other.
 #[derive(Clone, Copy)]
-pub(super) struct HiddenRow<T> {
-    pub(super) x: [T; 4],
-    pub(super) y: [T; 4],
-    pub(super) one: [T; 5],
-}
+pub(super) struct HiddenRow<T>([T; 13]);
 
 /// Gauss elimination of the ten cubics (partial pivoting), as far as the six rows that lead with
-/// xxz xxw yyz yyw xyz xyw need it. `None` where a pivot vanishes.
+/// xxz xxw yyz yyw xyz xyw need it; then the rows that are free of these six. `None` where a pivot vanishes.
 #[inline(never)]
-pub(super) fn eliminate<T: Real>(m: &mut [Cubic<T>; 10]) -> Option<[HiddenRow<T>; 3]> {
+pub(super) fn eliminate<T: Real>(m: &mut [Cubic<T>; 10], rows: &mut [HiddenRow<T>; 3]) -> Option<()> {
+    // Rows change places by their addresses.
+    let mut m = m.each_mut();
     let mut inverse = [T::ZERO; 10];
-    inverse[0] = column::<T, 0>(m)?;
-    inverse[1] = column::<T, 1>(m)?;
-    inverse[2] = column::<T, 2>(m)?;
-    inverse[3] = column::<T, 3>(m)?;
-    inverse[4] = column::<T, 4>(m)?;
-    inverse[5] = column::<T, 5>(m)?;
-    inverse[6] = column::<T, 6>(m)?;
-    inverse[7] = column::<T, 7>(m)?;
-    inverse[8] = column::<T, 8>(m)?;
-    inverse[9] = column::<T, 9>(m)?;
-    // Back substitution of rows 4 to 9 in the last ten columns.
-    for k in (4..10).rev() {
-        let mut row = m[k];
-        for j in k + 1..10 {
-            let f = row[j];
-            for c in 10..20 {
-                row[c] -= f * m[j][c];
+    // The first ten columns. The multipliers stay where they eliminate.
+    for k in 0..10 {
+        let (mut pivot, mut largest) = (k, abs(m[k][k]));
+        for i in k + 1..10 {
+            let size = abs(m[i][k]);
+            if size > largest {
+                (pivot, largest) = (i, size);
             }
         }
-        for c in 10..20 {
-            m[k][c] = row[c] * inverse[k];
+        if !(largest > T::ZERO) {
+            return None;
         }
+        m.swap(k, pivot);
+        inverse[k] = T::ONE / m[k][k];
+        // All ten whatever k, with zeros up to k: cheaper than a loop whose length varies.
+        let mut top = [T::ZERO; 10];
+        for c in 0..10 {
+            top[c] = if c > k { m[k][c] } else { T::ZERO };
+        }
+        for row in m.iter_mut().skip(k + 1) {
+            let f = row[k] * inverse[k];
+            for c in 0..10 {
+                row[c] -= f * top[c];
+            }
+            row[k] = f;
+        }
+    }
+    // The last ten columns: forward, then back for the rows that are needed.
+    for k in 1..10 {
+        let mut row = last_ten(m[k]);
+        for j in 0..k {
+            subtract(&mut row, m[k][j], m[j]);
+        }
+        store(m[k], &row);
+    }
+    for k in (4..10).rev() {
+        let mut row = last_ten(m[k]);
+        for j in k + 1..10 {
+            subtract(&mut row, m[k][j], m[j]);
+        }
+        row.iter_mut().for_each(|v| *v *= inverse[k]);
+        store(m[k], &row);
     }
     // Row p leads with a monomial times z, row q with the same monomial times w: p - z q is free of both.
-    let hidden = |p: &Cubic<T>, q: &Cubic<T>| HiddenRow {
-        x: [p[12], p[11] - q[12], p[10] - q[11], -q[10]],
-        y: [p[15], p[14] - q[15], p[13] - q[14], -q[13]],
-        one: [p[19], p[18] - q[19], p[17] - q[18], p[16] - q[17], -q[16]],
-    };
-    let mut rows = [hidden(&m[4], &m[5]), hidden(&m[6], &m[7]), hidden(&m[8], &m[9])];
-    orthonormalise(&mut rows)?;
-    Some(rows)
+    let [.., p0, q0, p1, q1, p2, q2] = m;
+    for (HiddenRow(row), [p, q]) in rows.iter_mut().zip([[p0, q0], [p1, q1], [p2, q2]]) {
+        *row = [
+            p[12],
+            p[11] - q[12],
+            p[10] - q[11],
+            -q[10],
+            p[15],
+            p[14] - q[15],
+            p[13] - q[14],
+            -q[13],
+            p[19],
+            p[18] - q[19],
+            p[17] - q[18],
+            p[16] - q[17],
+            -q[16],
+        ];
+    }
+    orthonormalise(rows)
 }
 
-/// Brings the largest element of column `K`, from row `K` down, into row `K` and eliminates the column below it. The
-/// inverse of the pivot.
 #[inline(always)]
-fn column<T: Real, const K: usize>(m: &mut [Cubic<T>; 10]) -> Option<T> {
-    let (mut pivot, mut largest) = (K, abs(m[K][K]));
-    for i in K + 1..10 {
-        let size = abs(m[i][K]);
-        if size > largest {
-            (pivot, largest) = (i, size);
-        }
+fn last_ten<T: Real>(row: &Cubic<T>) -> [T; 10] {
+    let mut last = [T::ZERO; 10];
+    for c in 0..10 {
+        last[c] = row[10 + c];
     }
-    if !(largest > T::ZERO) {
-        return None;
+    last
+}
+
+#[inline(always)]
+fn store<T: Real>(row: &mut Cubic<T>, last: &[T; 10]) {
+    for c in 0..10 {
+        row[10 + c] = last[c];
     }
-    // Row K goes where the pivot's row was; no branch, for which of the two happens is a coin's toss.
-    let mut row = [T::ZERO; 20];
-    for c in K..20 {
-        row[c] = m[pivot][c];
-        m[pivot][c] = m[K][c];
+}
+
+#[inline(always)]
+fn subtract<T: Real>(row: &mut [T; 10], f: T, other: &Cubic<T>) {
+    for c in 0..10 {
+        row[c] -= f * other[10 + c];
     }
-    let inverse = T::ONE / row[K];
-    m[K] = row;
-    for i in K + 1..10 {
-        let f = m[i][K] * inverse;
-        for c in K + 1..20 {
-            m[i][c] -= f * row[c];
-        }
-    }
-    Some(inverse)
 }
 
 impl<T: Real> HiddenRow<T> {
+    pub(super) const ZERO: Self = Self([T::ZERO; 13]);
+
     /// The row in 1 / z.
-    pub(super) fn reversed(mut self) -> Self {
-        self.x.reverse();
-        self.y.reverse();
-        self.one.reverse();
-        self
+    pub(super) fn reversed(self) -> Self {
+        let [x0, x1, x2, x3, y0, y1, y2, y3, o0, o1, o2, o3, o4] = self.0;
+        Self([x3, x2, x1, x0, y3, y2, y1, y0, o4, o3, o2, o1, o0])
     }
 
     /// The row in z - s (Horner's scheme, repeated).
-    pub(super) fn shifted(mut self, s: T) -> Self {
+    pub(super) fn shifted(self, s: T) -> Self {
+        let [x0, x1, x2, x3, y0, y1, y2, y3, o0, o1, o2, o3, o4] = self.0;
+        let (mut x, mut y, mut o) = ([x0, x1, x2, x3], [y0, y1, y2, y3], [o0, o1, o2, o3, o4]);
         for level in 0..3 {
             for i in (level..3).rev() {
-                self.x[i] += s * self.x[i + 1];
-                self.y[i] += s * self.y[i + 1];
+                x[i] += s * x[i + 1];
+                y[i] += s * y[i + 1];
             }
         }
         for level in 0..4 {
             for i in (level..4).rev() {
-                self.one[i] += s * self.one[i + 1];
+                o[i] += s * o[i + 1];
             }
         }
-        self
+        Self([x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3], o[0], o[1], o[2], o[3], o[4]])
     }
 
     #[inline(always)]
     fn dot(&self, other: &Self) -> T {
         // Four sums, so that no addition waits for the one before it.
-        let mut sum = self.x;
+        let mut sum = [T::ZERO; 4];
         for i in 0..4 {
-            sum[i] *= other.x[i];
+            sum[i] = self.0[i] * other.0[i];
         }
-        for i in 0..4 {
-            sum[i] += self.y[i] * other.y[i];
+        for i in 4..12 {
+            sum[i % 4] += self.0[i] * other.0[i];
         }
-        for i in 0..4 {
-            sum[i] += self.one[i] * other.one[i];
-        }
-        (sum[0] + sum[1]) + (sum[2] + sum[3]) + self.one[4] * other.one[4]
+        (sum[0] + sum[1]) + (sum[2] + sum[3]) + self.0[12] * other.0[12]
     }
 
     #[inline(always)]
     fn add_scaled(&mut self, other: &Self, f: T) {
-        for i in 0..4 {
-            self.x[i] += f * other.x[i];
-            self.y[i] += f * other.y[i];
-        }
-        for i in 0..5 {
-            self.one[i] += f * other.one[i];
+        for i in 0..13 {
+            self.0[i] += f * other.0[i];
         }
     }
 
     #[inline(always)]
     fn scale(&mut self, f: T) {
-        self.x = self.x.map(|v| v * f);
-        self.y = self.y.map(|v| v * f);
-        self.one = self.one.map(|v| v * f);
+        for i in 0..13 {
+            self.0[i] *= f;
+        }
     }
 }
 
@@ -166,20 +183,24 @@ fn orthonormalise<T: Real>([a, b, c]: &mut [HiddenRow<T>; 3]) -> Option<()> {
 /// The determinant of the three rows, coefficients from z^0 to z^10, in the scalar `W`.
 #[inline]
 pub(super) fn determinant<T: Real, W: Real>(rows: &[HiddenRow<T>; 3]) -> [W; 11] {
-    let wide4 = |v: &[T; 4]| v.map(|x| <W as Real>::from_f64(x.to_f64()));
-    let [a, b, c] =
-        rows.each_ref().map(|r| (wide4(&r.x), wide4(&r.y), r.one.map(|x| <W as Real>::from_f64(x.to_f64()))));
+    let mut wide = [[W::ZERO; 13]; 3];
+    for (wide, row) in wide.iter_mut().zip(rows) {
+        for (wide, &x) in wide.iter_mut().zip(&row.0) {
+            *wide = <W as Real>::from_f64(x.to_f64());
+        }
+    }
+    let [a, b, c] = &wide;
     let mut det = [W::ZERO; 11];
-    for (first, second, third) in [(&a, &b, &c), (&b, &c, &a), (&c, &a, &b)] {
+    for (first, second, third) in [(a, b, c), (b, c, a), (c, a, b)] {
         let mut minor = [W::ZERO; 7];
         for p in 0..4 {
             for q in 0..4 {
-                minor[p + q] += first.0[p] * second.1[q] - second.0[p] * first.1[q];
+                minor[p + q] += first[p] * second[4 + q] - second[p] * first[4 + q];
             }
         }
         for p in 0..7 {
             for q in 0..5 {
-                det[p + q] += minor[p] * third.2[q];
+                det[p + q] += minor[p] * third[8 + q];
             }
         }
     }
@@ -189,29 +210,37 @@ pub(super) fn determinant<T: Real, W: Real>(rows: &[HiddenRow<T>; 3]) -> [W; 11]
 /// The null vectors (x, y, 1) of the rows at z = `num` / `den`, homogeneous: unit vectors of the coefficients of the four
 /// basis matrices. The larger of |num|, |den| is near 1.
 #[inline(always)]
-pub(super) fn unknowns<T: Real>(rows: &[HiddenRow<T>; 3], num: Four<T>, den: Four<T>) -> [Four<T>; 4] {
+pub(super) fn unknowns<T: Real, const L: usize>(
+    rows: &[HiddenRow<T>; 3],
+    num: Batch<T, L>,
+    den: Batch<T, L>,
+) -> [Batch<T, L>; 4] {
     let (n2, nd, d2) = (num * num, num * den, den * den);
     let cubics = [d2 * den, d2 * num, n2 * den, n2 * num];
     let quartics = [d2 * d2, d2 * nd, n2 * d2, n2 * nd, n2 * n2];
-    let b = rows.map(|r| {
-        let cubic = |p: &[T; 4]| {
-            (cubics[0].times(p[0]) + cubics[1].times(p[1])) + (cubics[2].times(p[2]) + cubics[3].times(p[3]))
-        };
-        let p = r.one;
-        let low = quartics[0].times(p[0]) + quartics[1].times(p[1]);
-        let high = quartics[3].times(p[3]) + quartics[4].times(p[4]);
-        [cubic(&r.x), cubic(&r.y), low + quartics[2].times(p[2]) + high]
-    });
+    let cubic = |p0, p1, p2, p3| {
+        (cubics[0].times(p0) + cubics[1].times(p1)) + (cubics[2].times(p2) + cubics[3].times(p3))
+    };
+    let mut b = [[Batch::splat(T::ZERO); 3]; 3];
+    for (b, HiddenRow(p)) in b.iter_mut().zip(rows) {
+        let low = quartics[0].times(p[8]) + quartics[1].times(p[9]);
+        let high = quartics[3].times(p[11]) + quartics[4].times(p[12]);
+        *b = [
+            cubic(p[0], p[1], p[2], p[3]),
+            cubic(p[4], p[5], p[6], p[7]),
+            low + quartics[2].times(p[10]) + high,
+        ];
+    }
     let [mut best, second, third] = [cross(&b[0], &b[1]), cross(&b[1], &b[2]), cross(&b[2], &b[0])];
     let mut largest = norm_sq(&best);
     for other in [second, third] {
         let size = norm_sq(&other);
         let mask = size.greater(largest);
-        largest = Four::select(mask, size, largest);
+        largest = Batch::select(mask, size, largest);
         best = select(mask, &other, &best);
     }
     // x and y come divided by the scale of the homogeneous z.
     let c = [best[0], best[1], best[2] * num, best[2] * den];
-    let s = Four::splat(T::ONE) / (c[0] * c[0] + c[1] * c[1] + (c[2] * c[2] + c[3] * c[3])).root();
-    c.map(|v| v * s)
+    let s = Batch::splat(T::ONE) / (c[0] * c[0] + c[1] * c[1] + (c[2] * c[2] + c[3] * c[3])).root();
+    [c[0] * s, c[1] * s, c[2] * s, c[3] * s]
 }

@@ -7,11 +7,11 @@ mod polish;
 use nalgebra::{Matrix3, Vector3};
 
 use self::cubics::essential_cubics;
-use self::hidden::{determinant, unknowns};
+use self::hidden::{HiddenRow, determinant, unknowns};
 use crate::geometry::{Essential, Pose};
-use crate::linalg::four::Four;
+use crate::linalg::batch::{BATCH, Batch};
 use crate::linalg::null_space;
-use crate::linalg::poly::{projective_roots_10, real_roots_10};
+use crate::linalg::poly::{LeastDetermined, projective_roots_10, real_roots_10};
 use crate::real::{abs, lit, min};
 use crate::{Real, Solutions};
 
@@ -63,7 +63,9 @@ const SAME: f64 = 32.0;
 /// assert!(solutions.iter().any(|e| (e.0 - truth).norm().min((e.0 + truth).norm()) < 1e-12));
 /// ```
 pub fn relpose_5pt<T: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) -> Solutions<Essential<T>, 10> {
-    solve::<T, T>(x1, x2)
+    let mut found = Found::new();
+    solve::<T, T>(x1, x2, &mut found);
+    found.solutions()
 }
 
 /// [`relpose_5pt`] with the polynomial of degree 10 and its roots in `f64`, for a core with a double-precision unit.
@@ -82,7 +84,9 @@ pub fn relpose_5pt<T: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) -> Solut
 /// assert!(solutions.iter().any(|e| (e.0 - truth).norm().min((e.0 + truth).norm()) < 1e-4));
 /// ```
 pub fn relpose_5pt_wide(x1: &[Vector3<f32>; 5], x2: &[Vector3<f32>; 5]) -> Solutions<Essential<f32>, 10> {
-    solve::<f32, f64>(x1, x2)
+    let mut found = Found::new();
+    solve::<f32, f64>(x1, x2, &mut found);
+    found.solutions()
 }
 
 /// The poses of view 2 in the frame of view 1 that five bearing pairs allow with all five points in front of both
@@ -104,18 +108,36 @@ pub fn relpose_5pt_wide(x1: &[Vector3<f32>; 5], x2: &[Vector3<f32>; 5]) -> Solut
 /// assert!(poses.iter().any(|p| (p.to_homogeneous() - truth.to_homogeneous()).norm() < 1e-12));
 /// ```
 pub fn relpose_5pt_poses<T: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) -> Solutions<Pose<T>, 10> {
+    let mut found = Found::new();
+    solve::<T, T>(x1, x2, &mut found);
     let mut poses = Solutions::new();
-    for e in &relpose_5pt(x1, x2) {
-        if let Some(pose) = e.twisted_pair().and_then(|pair| pair.pose_with_all_in_front(x1, x2)) {
-            poses.push(pose);
-        }
-    }
+    found.poses(x1, x2, &mut poses);
     poses
 }
 
-#[inline]
-fn solve<T: Real, W: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) -> Solutions<Essential<T>, 10> {
-    let mut found = Found { coefficients: [[T::ZERO; 4]; 10], len: 0 };
+/// The bearing pairs' solutions, with the polynomial and its roots in the scalar `W`.
+#[inline(never)]
+fn solve<T: Real, W: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5], found: &mut Found<T>) {
+    let mut rows = [HiddenRow::ZERO; 3];
+    if null_basis(x1, x2, &mut found.basis).is_none() || hidden_rows(&found.basis, &mut rows).is_none() {
+        return;
+    }
+    let [inside, outside] = found.add_roots(&rows, Chart::<T, W>::Line);
+    // Where roots crowd, the coefficients do not tell them apart: there the polynomial is expanded anew.
+    let (turned, centre) = if outside.spread > inside.spread { (true, outside) } else { (false, inside) };
+    if centre.spread > lit(SPREAD) {
+        let shift = narrow(centre.x);
+        for row in &mut rows {
+            *row = if turned { row.reversed() } else { *row }.shifted(shift);
+        }
+        let radius = min(lit::<W>(4.0) * centre.spread, W::ONE);
+        found.add_roots(&rows, Chart::Disc { radius, shift, turned });
+    }
+}
+
+/// An orthonormal basis, element by element, of the matrices that the five equations leave.
+#[inline(never)]
+fn null_basis<T: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5], basis: &mut [[T; 4]; 9]) -> Option<()> {
     let mut rows = [[T::ZERO; 9]; 5];
     for ((row, a), b) in rows.iter_mut().zip(x1).zip(x2) {
         *row = [
@@ -130,73 +152,46 @@ fn solve<T: Real, W: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) -> Soluti
             b.z * a.z,
         ];
     }
-    let Some(null) = null_space::<T, 5, 9, 4>(&rows) else { return Solutions::new() };
-    let mut basis = [[T::ZERO; 4]; 9];
+    let null = null_space::<T, 5, 9, 4>(&rows)?;
     for (k, vector) in null.iter().enumerate() {
         for (row, &v) in basis.iter_mut().zip(vector) {
             row[k] = v;
         }
     }
-    let Some(rows) = hidden::eliminate(&mut essential_cubics(&basis)) else { return Solutions::new() };
-
-    let error = lit::<W>(POLYNOMIAL_ERROR) * lit(T::EPSILON.to_f64());
-    let narrow = |v: W| lit::<T>(v.to_f64());
-    let [inside, outside] = projective_roots_10(&determinant::<T, W>(&rows), error);
-    let mut candidates = Candidates::new();
-    inside.as_slice().iter().for_each(|&x| candidates.push(narrow(x), T::ONE));
-    outside.as_slice().iter().for_each(|&x| candidates.push(T::ONE, narrow(x)));
-    found.add(&basis, &candidates, |num, den| unknowns(&rows, num, den));
-
-    // Where roots crowd, the coefficients do not tell them apart: there the polynomial is expanded anew.
-    let (a, b) = (inside.least_determined(), outside.least_determined());
-    let (turned, centre) = if b.spread > a.spread { (true, b) } else { (false, a) };
-    if centre.spread > lit(SPREAD) {
-        let shift = narrow(centre.x);
-        let near = rows.map(|r| if turned { r.reversed() } else { r }.shifted(shift));
-        let radius = min(lit::<W>(4.0) * centre.spread, W::ONE);
-        let mut det = determinant::<T, W>(&near);
-        let mut power = W::ONE;
-        for c in &mut det {
-            *c *= power;
-            power *= radius;
-        }
-        let mut candidates = Candidates::new();
-        real_roots_10(&det, error)
-            .as_slice()
-            .iter()
-            .for_each(|&x| candidates.push(narrow(x * radius), T::ONE));
-        found.add(&basis, &candidates, |num, den| {
-            let [x, y, z, w] = unknowns(&near, num, den);
-            let z = z + w.times(shift);
-            if turned { [x, y, w, z] } else { [x, y, z, w] }
-        });
-    }
-
-    let mut solutions = Solutions::new();
-    for c in found.coefficients.iter().take(found.len) {
-        let e = basis.map(|b| (b[0] * c[0] + b[1] * c[1]) + (b[2] * c[2] + b[3] * c[3]));
-        solutions.push(Essential(Matrix3::new(e[0], e[1], e[2], e[3], e[4], e[5], e[6], e[7], e[8])));
-    }
-    solutions
+    Some(())
 }
 
-/// Roots of the polynomial as pairs of numerators and denominators, in groups of four.
+/// The three equations that the coefficients of the basis matrices satisfy.
+#[inline(never)]
+fn hidden_rows<T: Real>(basis: &[[T; 4]; 9], rows: &mut [HiddenRow<T>; 3]) -> Option<()> {
+    hidden::eliminate(&mut essential_cubics(basis), rows)
+}
+
+#[inline(always)]
+fn narrow<T: Real, W: Real>(v: W) -> T {
+    lit(v.to_f64())
+}
+
+/// Where roots are looked for.
+enum Chart<T, W> {
+    /// On the whole projective line.
+    Line,
+    /// Up to `radius` from `shift`, about which the rows stand expanded; `turned`: of the reciprocal.
+    Disc { radius: W, shift: T, turned: bool },
+}
+
+/// Roots of the polynomial: first those in [-1, 1], then the reciprocals of the others.
 struct Candidates<T> {
-    groups: [[Four<T>; 2]; 6],
+    roots: [T; 24],
+    inside: usize,
     len: usize,
 }
 
 impl<T: Real> Candidates<T> {
     #[inline]
-    fn new() -> Self {
-        // Unused lanes repeat z = 0.
-        Self { groups: [[Four::splat(T::ZERO), Four::splat(T::ONE)]; 6], len: 0 }
-    }
-
-    #[inline]
-    fn push(&mut self, num: T, den: T) {
-        if let Some([n, d]) = self.groups.get_mut(self.len / 4) {
-            (n.0[self.len % 4], d.0[self.len % 4]) = (num, den);
+    fn push(&mut self, root: T) {
+        if let Some(slot) = self.roots.get_mut(self.len) {
+            *slot = root;
             self.len += 1;
         }
     }
@@ -204,45 +199,133 @@ impl<T: Real> Candidates<T> {
 
 /// Solutions, as unit vectors of the coefficients of the four basis matrices.
 struct Found<T> {
+    basis: [[T; 4]; 9],
     coefficients: [[T; 4]; 10],
     len: usize,
 }
 
 impl<T: Real> Found<T> {
-    /// Newton from each candidate; keeps those that arrive at an essential matrix not found before.
-    #[inline(always)]
-    fn add(
-        &mut self,
-        basis: &[[T; 4]; 9],
-        candidates: &Candidates<T>,
-        start: impl Fn(Four<T>, Four<T>) -> [Four<T>; 4],
-    ) {
-        let mut left = candidates.len;
-        for &[num, den] in candidates.groups.iter().take(candidates.len.div_ceil(4)) {
-            self.add_group(basis, start(num, den), left);
-            left = left.saturating_sub(4);
+    #[inline]
+    fn new() -> Self {
+        Self { basis: [[T::ZERO; 4]; 9], coefficients: [[T::ZERO; 4]; 10], len: 0 }
+    }
+
+    /// Apart from the solver, whose frame would else lie on top of this one's.
+    #[inline(never)]
+    fn poses(&self, x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5], poses: &mut Solutions<Pose<T>, 10>) {
+        for e in self.matrices() {
+            let Some(pair) = e.twisted_pair() else { continue };
+            if let Some(pose) = pair.pose_with_all_in_front(x1, x2) {
+                poses.push(pose);
+            }
         }
     }
 
-    /// The first `count` of four candidates.
+    #[inline]
+    fn solutions(&self) -> Solutions<Essential<T>, 10> {
+        let mut solutions = Solutions::new();
+        self.matrices().for_each(|e| {
+            solutions.push(e);
+        });
+        solutions
+    }
+
+    #[inline]
+    fn matrices(&self) -> impl Iterator<Item = Essential<T>> {
+        self.coefficients.iter().take(self.len).map(|c| {
+            let mut e = Matrix3::zeros();
+            for (k, b) in self.basis.iter().enumerate() {
+                e[(k / 3, k % 3)] = (b[0] * c[0] + b[1] * c[1]) + (b[2] * c[2] + b[3] * c[3]);
+            }
+            Essential(e)
+        })
+    }
+
+    /// Adds the solutions that belong to the roots of the rows' determinant. The roots that are the least determined.
     #[inline(never)]
-    fn add_group(&mut self, basis: &[[T; 4]; 9], mut c: [Four<T>; 4], count: usize) {
-        let mut arrived = [0, 1, 2, 3].map(|k| k >= count);
-        let threshold = Four::splat(T::EPSILON);
-        let mut near = [false; 4];
+    fn add_roots<W: Real>(
+        &mut self,
+        rows: &[HiddenRow<T>; 3],
+        chart: Chart<T, W>,
+    ) -> [LeastDetermined<W>; 2] {
+        let error = lit::<W>(POLYNOMIAL_ERROR) * lit(T::EPSILON.to_f64());
+        let mut polynomial = determinant::<T, W>(rows);
+        let mut candidates = Candidates { roots: [T::ZERO; 24], inside: 24, len: 0 };
+        let worst;
+        let mut scale = W::ONE;
+        match chart {
+            Chart::Line => {
+                let [inside, outside] = projective_roots_10(&polynomial, error);
+                inside.as_slice().iter().for_each(|&x| candidates.push(narrow(x)));
+                candidates.inside = candidates.len;
+                outside.as_slice().iter().for_each(|&x| candidates.push(narrow(x)));
+                worst = [inside.least_determined(), outside.least_determined()];
+            }
+            Chart::Disc { radius, .. } => {
+                for c in &mut polynomial {
+                    *c *= scale;
+                    scale *= radius;
+                }
+                let roots = real_roots_10(&polynomial, error);
+                roots.as_slice().iter().for_each(|&x| candidates.push(narrow(x * radius)));
+                worst = [roots.least_determined(); 2];
+            }
+        }
+        let expansion = match chart {
+            Chart::Line => None,
+            Chart::Disc { shift, turned, .. } => Some((shift, turned)),
+        };
+        self.add::<BATCH>(&candidates, rows, expansion);
+        worst
+    }
+
+    /// Newton from each candidate, `L` side by side; keeps those that arrive at an essential matrix not found before.
+    #[inline(always)]
+    fn add<const L: usize>(
+        &mut self,
+        candidates: &Candidates<T>,
+        rows: &[HiddenRow<T>; 3],
+        expansion: Option<(T, bool)>,
+    ) {
+        let mut first = 0;
+        for roots in candidates.roots.chunks_exact(L).take(candidates.len.div_ceil(L)) {
+            let (mut num, mut den) = ([T::ONE; L], [T::ONE; L]);
+            for (k, &root) in roots.iter().take(L).enumerate() {
+                if first + k < candidates.inside { num[k] = root } else { den[k] = root }
+            }
+            let mut c = unknowns(rows, Batch(num), Batch(den));
+            if let Some((shift, turned)) = expansion {
+                c[2] = c[2] + c[3].times(shift);
+                if turned {
+                    c.swap(2, 3);
+                }
+            }
+            self.add_group(c, candidates.len - first);
+            first += L;
+        }
+    }
+
+    /// The first `count` of `L` candidates.
+    #[inline(always)]
+    fn add_group<const L: usize>(&mut self, mut c: [Batch<T, L>; 4], count: usize) {
+        let (mut arrived, mut near) = ([false; L], [false; L]);
+        for k in 0..L {
+            arrived[k] = k >= count;
+        }
+        let threshold = Batch::splat(T::EPSILON);
         for _ in 0..STEPS {
-            let (next, step_sq) = polish::newton_step(basis, &c);
+            let (next, step_sq) = polish::newton_step(&self.basis, &c);
             c = polish::select(near, &c, &next);
             let small = threshold.greater(step_sq);
-            for k in 0..4 {
+            for k in 0..L {
                 near[k] |= small[k];
                 arrived[k] |= small[k];
             }
-            if arrived == [true; 4] {
+            if arrived == [true; L] {
                 break;
             }
         }
-        for k in 0..4 {
+        for k in 0..L {
             if k < count && near[k] {
                 self.keep([c[0].0[k], c[1].0[k], c[2].0[k], c[3].0[k]]);
             }
