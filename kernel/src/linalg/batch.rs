@@ -26,17 +26,17 @@ macro_rules! operator {
             #[inline(always)]
             fn $method(mut self, o: Self) -> Self {
                 for k in 0..L {
-                    self.0[k] = self.0[k] $op o.0[k];
+                    self.0[k] $op o.0[k];
                 }
                 self
             }
         }
     };
 }
-operator!(Add, add, +);
-operator!(Sub, sub, -);
-operator!(Mul, mul, *);
-operator!(Div, div, /);
+operator!(Add, add, +=);
+operator!(Sub, sub, -=);
+operator!(Mul, mul, *=);
+operator!(Div, div, /=);
 
 impl<T: Real, const L: usize> Neg for Batch<T, L> {
     type Output = Self;

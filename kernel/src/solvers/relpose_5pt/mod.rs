@@ -233,11 +233,11 @@ impl<T: Real> Found<T> {
     #[inline]
     fn matrices(&self) -> impl Iterator<Item = Essential<T>> {
         self.coefficients.iter().take(self.len).map(|c| {
-            let mut e = Matrix3::zeros();
-            for (k, b) in self.basis.iter().enumerate() {
-                e[(k / 3, k % 3)] = (b[0] * c[0] + b[1] * c[1]) + (b[2] * c[2] + b[3] * c[3]);
+            let mut e = [T::ZERO; 9];
+            for (e, b) in e.iter_mut().zip(&self.basis) {
+                *e = (b[0] * c[0] + b[1] * c[1]) + (b[2] * c[2] + b[3] * c[3]);
             }
-            Essential(e)
+            Essential(Matrix3::new(e[0], e[1], e[2], e[3], e[4], e[5], e[6], e[7], e[8]))
         })
     }
 
