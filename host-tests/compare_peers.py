@@ -46,7 +46,18 @@ def rotation(rng, max_deg):
     return np.eye(3) + np.sin(angle) * s + (1 - np.cos(angle)) * s @ s
 
 
-def synthetic(task, scene, n, outliers, noise_px, seed):
+# What synthetic scenes usually leave out, one at a time.
+DISTURBANCES = {
+    "clusters": "wrong matches lead from one of three patches of 60 px to one of three others",
+    "second-motion": "30 % of the matches belong to a body with another motion",
+    "heavy-tails": "noise of Student's t with three degrees of freedom and the given deviation",
+    "integers": "pixels are rounded",
+    "focal": "the focal lengths given are 1 % too long",
+    "many-to-one": "wrong matches end in five pixels",
+}
+
+
+def synthetic(task, scene, n, outliers, noise_px, seed, disturbance=None):
     rng = np.random.default_rng(seed)
     k = np.array([FOCAL, FOCAL, CX, CY])
     forward = scene == "forward"
@@ -70,9 +81,31 @@ def synthetic(task, scene, n, outliers, noise_px, seed):
     a, b, X = np.array(a), np.array(b), np.array(X)
     K = np.array([[FOCAL, 0, CX], [0, FOCAL, CY], [0, 0, 1]])
     H = K @ (R + np.outer(t, plane)) @ np.linalg.inv(K)
-    a, b = a + noise_px * rng.normal(size=a.shape), b + noise_px * rng.normal(size=b.shape)
-    wrong = rng.permutation(n)[: round(outliers * n)]
-    b[wrong] = rng.uniform(0, 1, (len(wrong), 2)) * [WIDTH, HEIGHT]
+    order = rng.permutation(n)
+    wrong = order[: round(outliers * n)]
+    if disturbance == "second-motion":
+        body = order[len(wrong) :][: round(0.3 * n)]
+        moved = (X[body] - [0, 0, 8]) @ rotation(rng, 20).T + [0, 0, 8] + 2 * rng.normal(size=3)
+        moved[:, 2] = np.maximum(moved[:, 2], 1)
+        b[body] = FOCAL * moved[:, :2] / moved[:, 2:] + [CX, CY]
+    if disturbance == "heavy-tails":
+        noise = lambda shape: noise_px / np.sqrt(3) * rng.standard_t(3, shape)
+    else:
+        noise = lambda shape: noise_px * rng.normal(size=shape)
+    a, b = a + noise(a.shape), b + noise(b.shape)
+    whole = np.array([WIDTH, HEIGHT])
+    if disturbance == "clusters":
+        patches = rng.uniform(0, 1, (2, 3, 2)) * (whole - 60)
+        which = rng.integers(0, 3, len(wrong))
+        a[wrong], b[wrong] = (patch[which] + 60 * rng.uniform(0, 1, (len(wrong), 2)) for patch in patches)
+    elif disturbance == "many-to-one":
+        b[wrong] = (rng.uniform(0, 1, (5, 2)) * whole)[rng.integers(0, 5, len(wrong))]
+    else:
+        b[wrong] = rng.uniform(0, 1, (len(wrong), 2)) * whole
+    if disturbance == "integers":
+        a, b = np.round(a), np.round(b)
+    if disturbance == "focal":
+        k = k * [1.01, 1.01, 1, 1]
     truth = {"H": H} if task == "homography" else {"R": R, "t": t}
     return {"a": X if task == "absolute-pose" else a, "b": b, "k1": k, "k2": k, "size": (WIDTH, HEIGHT), **truth}
 
@@ -310,6 +343,7 @@ def main():
     parser.add_argument("task", choices=["relative-pose", "fundamental", "homography", "absolute-pose"])
     parser.add_argument("paths", nargs="*", type=pathlib.Path, metavar="PATH", help="files; synthetic scenes without")
     parser.add_argument("--scene", choices=["general", "forward", "planar"], help="default: general, or planar for homographies")
+    parser.add_argument("--disturbance", choices=DISTURBANCES, help="; ".join(f"{name}: {what}" for name, what in DISTURBANCES.items()).replace("%", "%%"))
     parser.add_argument("--points", type=int, nargs="+", default=[100, 200, 2000], help="of a synthetic scene")
     parser.add_argument("--outliers", type=float, nargs="+", default=[0.1, 0.3, 0.5], help="share, 0 to 1")
     parser.add_argument("--noise", type=float, default=1.0, help="of synthetic pixels, standard deviation (default 1)")
@@ -320,6 +354,8 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     a = parser.parse_args()
 
+    if a.disturbance and a.task == "absolute-pose":
+        parser.error("--disturbance is for two views")
     scene = a.scene or ("planar" if a.task == "homography" else "general")
     threshold = a.threshold or MAX_ERROR_PX.get(a.task, 2.0)
     if a.paths:
@@ -327,8 +363,9 @@ def main():
         groups = {f"{len(files)} files": [read(f, a.task, a.max_corr, a.seed) for f in files]}
     else:
         groups = {
-            f"{scene}, {n} points, {100 * share:.0f} % outliers": [
-                synthetic(a.task, scene, n, share, a.noise, [a.seed, n, round(1000 * share), k]) for k in range(a.trials)
+            f"{scene}{a.disturbance and ', ' + a.disturbance or ''}, {n} points, {100 * share:.0f} % outliers": [
+                synthetic(a.task, scene, n, share, a.noise, [a.seed, n, round(1000 * share), k], a.disturbance)
+                for k in range(a.trials)
             ]
             for n in a.points
             for share in a.outliers
