@@ -12,7 +12,7 @@ use super::transfer::TransferProblem;
 use super::workspace::{TwoViewStorage, TwoViewWorkspace};
 use crate::Real;
 use crate::linalg::LANES;
-use crate::real::{lit, max, sqrt};
+use crate::real::{lit, max, min, sqrt};
 use crate::refine::blocks::{Block, BlockSlice, EpipolarBlock, PlaneBlock};
 use crate::refine::homography::{HomographyModel, transfer_sq};
 use crate::robust::budget::check_noise;
@@ -207,8 +207,12 @@ const FINAL_PASSES: u32 = 8;
 /// Inliers in a box of this many standard deviations are one point.
 const POINT_SIGMAS: f64 = 8.0;
 
-/// Where the weight of the last refinement vanishes, in thresholds.
-const FINAL_SUPPORT: f64 = 2.8;
+/// Where the weight of the last refinement vanishes, in standard deviations of the noise: of Gaussian noise hardly
+/// anything is lost, of points beside the plane most.
+const SUPPORT_SIGMAS: f64 = 8.0;
+
+/// The least and the largest such place, in thresholds.
+const SUPPORT: [f64; 2] = [1.5, 2.8];
 
 struct Judge<'a, 'b, T: Real> {
     problem: &'a TransferProblem<'b, T, PlaneBlock<T>>,
@@ -252,8 +256,10 @@ impl<T: Real> Judge<'_, '_, T> {
     ) -> (HomographyVerdict<T>, T) {
         let problem = self.problem;
         let data = problem.data;
-        // What lies beyond the threshold takes part at a falling weight: of Gaussian noise nothing is lost.
-        let support = problem.threshold * lit(FINAL_SUPPORT);
+        // What lies beyond the threshold takes part at a falling weight, as far as the noise of this plane may reach.
+        let noise = sqrt(Scatter::new(data, best, problem.threshold * T::TWO).variance());
+        let [least, largest] = SUPPORT.map(|share| problem.threshold * lit(share));
+        let support = min(max(noise * lit(SUPPORT_SIGMAS), least), largest);
         let minimum = problem.optimise(best, &Loss::Tukey(support), FINAL_PASSES, lit(1e-4));
         let Some(model) = HomographyModel::new(&minimum.model.0) else {
             return (self.without_model(mask, order), T::ZERO);
