@@ -12,7 +12,7 @@ use crate::Real;
 use crate::geometry::Pose;
 use crate::geometry::pose::from_parts;
 use crate::linalg::LANES;
-use crate::real::{from_u32, lit, max, sqrt};
+use crate::real::{from_u32, lit, max, min, sqrt};
 use crate::refine::blocks::EpipolarBlock;
 use crate::refine::homography::{RotationModel, transfer_sq};
 use crate::refine::lm::{Manifold, normal_equations};
@@ -41,6 +41,10 @@ pub(super) struct Judgement<T: Real> {
 /// Error of an inlier in two dimensions over the threshold: as likely for a true correspondence as the threshold is in
 /// one (chi-squared at 95 %: sqrt(5.99 / 3.84)).
 const PLANE_THRESHOLD: f64 = 1.25;
+/// Where the loss of the last refinement ends, in standard deviations of the noise: of Gaussian noise hardly anything is
+/// lost; and the least and largest such place, in thresholds.
+const SUPPORT_SIGMAS: f64 = 6.0;
+const SUPPORT: [f64; 2] = [0.8, 2.6];
 /// A plane must explain so many in twenty of the pose's inliers to be the verdict; of a planar scene it explains all but
 /// accidents.
 const PLANE_SHARE_OF_20: u32 = 17;
@@ -91,7 +95,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         let mut refined = self.refine(best);
         let accident = problem.accident(&refined, self.accident());
         let inliers = self.mark(&refined, mask);
-        let noise = self.spread(&refined).noise;
+        let noise = self.noise(&refined);
         if !beyond_chance(count, inliers, 5, accident) {
             // Of points on one line even wrong pairs may agree.
             let indices = list(mask, order);
@@ -158,7 +162,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
 
     /// The pose that all inliers support, with what lies just beyond the threshold at a falling weight.
     pub(super) fn refine(&self, model: &PoseModel<T>) -> PoseModel<T> {
-        let loss = Loss::Tukey(self.problem.threshold * T::TWO);
+        let loss = Loss::Tukey(self.support(model));
         self.problem.optimise(model, &loss, 10, lit(1e-5)).model
     }
 
@@ -183,8 +187,9 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
 
     /// A refined pose with its covariance, and the noise.
     pub(super) fn motion(&self, model: &PoseModel<T>) -> (GeneralMotion<T>, T) {
-        let spread = self.spread(model);
-        let loss = Loss::Truncated(self.problem.threshold * T::TWO);
+        let support = self.support(model);
+        let spread = self.spread(model, support);
+        let loss = Loss::Truncated(support);
         let mut sums = normal_equations(self.problem.data, model, &loss);
         if let Some((known, _)) = &self.problem.prior {
             known.add(&mut sums, &model.rotation, spread.variance);
@@ -198,15 +203,27 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         Judgement { verdict: RelativePoseVerdict::General(motion), noise }
     }
 
-    /// The spread of the residuals about a refined pose under its loss.
-    fn spread(&self, model: &PoseModel<T>) -> Spread<T> {
+    /// Where the loss about a pose ends: as far as the noise of these correspondences reaches.
+    fn support(&self, model: &PoseModel<T>) -> T {
+        let threshold = self.problem.threshold;
+        let [least, largest] = SUPPORT.map(|share| threshold * lit(share));
+        min(max(self.noise(model) * lit(SUPPORT_SIGMAS), least), largest)
+    }
+
+    /// The noise about a pose, from what lies within two thresholds.
+    fn noise(&self, model: &PoseModel<T>) -> T {
+        self.spread(model, self.problem.threshold * T::TWO).noise
+    }
+
+    /// The spread of the residuals about a pose under a loss that ends at `support`.
+    fn spread(&self, model: &PoseModel<T>, support: T) -> Spread<T> {
         let mut sums = PsiSums::default();
-        let quarter: T = lit(0.25);
+        let share = self.problem.threshold / support;
+        let scale = share * share;
         self.problem.for_each_block(model, |_, squared, filled| {
-            // The loss ends at two thresholds.
-            squared.iter().take(filled).for_each(|&s| sums.add(s * quarter));
+            squared.iter().take(filled).for_each(|&s| sums.add(s * scale));
         });
-        sums.spread(self.problem.threshold * T::TWO, 5)
+        sums.spread(support, 5)
     }
 
     pub(super) fn cost(&self, model: &PoseModel<T>) -> T {

@@ -110,7 +110,8 @@ pub type RelativePoseError = TwoViewError;
 /// where the views hardly differ ([`RelativePoseOptions::least_motion_px`]).
 ///
 /// # Accuracy
-/// That of a maximum-likelihood fit to the inliers (Tukey's loss, ending at two thresholds), in `f32` as in `f64`.
+/// That of a maximum-likelihood fit to the inliers (Tukey's loss, ending at six standard deviations of the noise found, 0.8
+/// to 2.6 thresholds), in `f32` as in `f64`.
 ///
 /// # Cost
 /// At most `max_iterations` samples, by itself as many as the confidence needs for the inliers found; beyond a budget of
@@ -280,8 +281,8 @@ fn load<T: Real>(
 /// A relative pose refined on all correspondences that agree with it, and its covariance; none where fewer than six do or
 /// they leave a direction open.
 ///
-/// The Sampson errors in pixels under Tukey's loss, which ends at twice `max_error_px`, over the five degrees of freedom
-/// of the pose, by Levenberg and Marquardt's method with analytic derivatives. A prior of the options takes part where it
+/// The Sampson errors in pixels under Tukey's loss, which ends at six standard deviations of the noise found (0.8 to 2.6
+/// times `max_error_px`), over the five degrees of freedom of the pose, by Levenberg and Marquardt's method with analytic derivatives. A prior of the options takes part where it
 /// fits the pose refined without it.
 ///
 /// # Input
