@@ -130,6 +130,7 @@ pub(crate) fn engine<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
     sink.flag(guide.scores.is_none());
     let location = Location(source.array());
     sink.flag(location.reject(&source.scalar()));
+    sink.flag(location.settles(&source.scalar(), &mut 0));
     sink.numbers(location.polish(&source.scalar(), &mut ScoreCounts::default()).iter());
     let consensus = ransac(&location, &options, None, 3, Some(&mut keep_going));
     for (model, score) in consensus.models.iter().flatten() {
