@@ -49,3 +49,11 @@ fn largest_magnitude<'a, T: Real>(elements: impl Iterator<Item = &'a T>) -> Opti
     }
     Some(largest)
 }
+
+/// A slice in pieces of `N`, the last of which may be shorter. `chunks` keeps `N` at run time, and with it the panic of a
+/// division by zero where its iterator is not inlined.
+#[inline]
+pub(crate) fn pieces<X, const N: usize>(slice: &[X]) -> impl Iterator<Item = &[X]> {
+    let (full, rest) = slice.as_chunks::<N>();
+    full.iter().map(|piece| piece.as_slice()).chain((!rest.is_empty()).then_some(rest))
+}

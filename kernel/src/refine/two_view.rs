@@ -9,7 +9,7 @@ use super::lm::{Manifold, Minimum, NormalEquations, descend, normal_equations};
 use super::relative_pose::{PoseModel, Scales};
 use crate::geometry::{Fundamental, Homography, Pose};
 use crate::input::{check_finite, check_lengths};
-use crate::linalg::LANES;
+use crate::linalg::{LANES, pieces};
 use crate::real::{abs, from_u32, is_finite, lit, max, sqrt};
 use crate::robust::loss::Loss;
 use crate::{InputError, Real};
@@ -121,9 +121,10 @@ fn minimise<T: Real, M: Manifold<T, P>, const P: usize>(
     let [a, b] = frame.centres;
     let pass = |model: &M| {
         let mut sums = NormalEquations::zero();
-        for (x1, x2) in x1.chunks(CHUNK * LANES).zip(x2.chunks(CHUNK * LANES)) {
+        for (x1, x2) in pieces::<_, { CHUNK * LANES }>(x1).zip(pieces::<_, { CHUNK * LANES }>(x2)) {
             let mut blocks = [PlaneBlock::zero(); CHUNK];
-            for (block, (x1, x2)) in blocks.iter_mut().zip(x1.chunks(LANES).zip(x2.chunks(LANES))) {
+            for (block, (x1, x2)) in blocks.iter_mut().zip(pieces::<_, LANES>(x1).zip(pieces::<_, LANES>(x2)))
+            {
                 for (lane, (p, q)) in x1.iter().zip(x2).enumerate() {
                     let point = [p.x - a[0], p.y - a[1], q.x - b[0], q.y - b[1]].map(|x| x * inverse);
                     block.write_lane(lane, &point);

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::geometry::{Homography, Whitening};
 use crate::input::{check_lengths, no_solution};
-use crate::linalg::RowQr;
+use crate::linalg::{RowQr, pieces};
 use crate::real::{abs, lit, sqrt};
 use crate::{InputError, Real};
 
@@ -64,9 +64,9 @@ pub fn homography_npt<T: Real>(
 fn estimate<T: Real>(x1: &[Vector3<T>], x2: &[Vector3<T>]) -> Option<Homography<T>> {
     let (t1, t2) = (Whitening::new(x1)?, Whitening::new(x2)?);
     let mut qr = RowQr::new();
-    for (a, b) in x1.chunks(BLOCK).zip(x2.chunks(BLOCK)) {
+    for (a, b) in pieces::<_, BLOCK>(x1).zip(pieces::<_, BLOCK>(x2)) {
         let mut rows = [[T::ZERO; 9]; 2 * BLOCK];
-        for ((pair, a), b) in rows.chunks_exact_mut(2).zip(a).zip(b) {
+        for ((pair, a), b) in rows.as_chunks_mut::<2>().0.iter_mut().zip(a).zip(b) {
             let a = t1.apply(a);
             for (row, p) in pair.iter_mut().zip(perpendiculars(&t2.apply(b))) {
                 *row = [

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::geometry::{Essential, Fundamental, Whitening};
 use crate::input::{check_lengths, no_solution};
-use crate::linalg::{RowQr, null_space_refined};
+use crate::linalg::{RowQr, null_space_refined, pieces};
 use crate::real::{lit, sqrt};
 use crate::{InputError, Real};
 
@@ -136,7 +136,7 @@ fn linear_estimate<T: Real>(
         vector
     } else {
         let mut qr = RowQr::new();
-        for (a, b) in x1.chunks(BLOCK).zip(x2.chunks(BLOCK)) {
+        for (a, b) in pieces::<_, BLOCK>(x1).zip(pieces::<_, BLOCK>(x2)) {
             qr.fold(rows::<T, BLOCK>(a, b, &t1, &t2));
         }
         let least = qr.least_singular()?;

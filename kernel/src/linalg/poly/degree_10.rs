@@ -370,10 +370,9 @@ fn value_and_derivatives<T: Real>(c: &Coefficients<T>, x: T) -> (T, T, T) {
 #[inline]
 fn polish<T: Real, const L: usize>(c: &Coefficients<T>, brackets: &Brackets<T>, error: T) -> RealRoots10<T> {
     let (mut roots, mut worst) = ([T::ZERO; CAPACITY], brackets.worst);
-    let groups = roots.chunks_exact_mut(L).zip(brackets.list.chunks_exact(L));
+    let groups = roots.as_chunks_mut::<L>().0.iter_mut().zip(brackets.list.as_chunks::<L>().0);
     let mut left = brackets.len;
     for (out, group) in groups.take(brackets.len.div_ceil(L)) {
-        let Ok(group) = <&[Bracket<T>; L]>::try_from(group) else { continue };
         let (mut x, mut slope) = ([T::ZERO; L], [T::ONE; L]);
         let (mut lo, mut hi, mut arrived) = ([T::ZERO; L], [T::ZERO; L], [false; L]);
         for k in 0..L {
