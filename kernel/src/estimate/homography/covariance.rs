@@ -5,7 +5,7 @@ use nalgebra::{SMatrix, Vector2};
 use super::super::frame::PixelFrame;
 use crate::Real;
 use crate::linalg::{LANES, Ldlt, Lu};
-use crate::real::{max, min};
+use crate::real::{from_u32, max, min};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock, PlaneBlock};
 use crate::refine::homography::{HomographyModel, transfer_sq};
 use crate::refine::lm::{Manifold, NormalEquations};
@@ -19,6 +19,8 @@ pub(super) struct Scatter<T> {
     squares: T,
     /// Sum of the mean derivative of a weighted residual by its residual.
     slopes: T,
+    /// How many correspondences lie within the support.
+    count: u32,
 }
 
 impl<T: Real> Scatter<T> {
@@ -26,7 +28,7 @@ impl<T: Real> Scatter<T> {
     pub(super) fn new(data: BlockSlice<'_, PlaneBlock<T>>, model: &HomographyModel<T>, support: T) -> Self {
         let inverse = T::ONE / (support * support);
         let three = T::TWO + T::ONE;
-        let mut result = Self { weights: T::ZERO, squares: T::ZERO, slopes: T::ZERO };
+        let mut result = Self { weights: T::ZERO, squares: T::ZERO, slopes: T::ZERO, count: 0 };
         let mut left = data.count;
         for block in data.blocks {
             let (plane, weight) = block.planes();
@@ -38,6 +40,7 @@ impl<T: Real> Scatter<T> {
                     result.weights += weight;
                     result.squares += weight * weight * squared * T::HALF;
                     result.slopes += v * (T::ONE - three * u);
+                    result.count += 1;
                 }
             }
             left = left.saturating_sub(LANES);
@@ -47,12 +50,19 @@ impl<T: Real> Scatter<T> {
 
     /// By how much the inverse of `J' W J` is to be multiplied: `E[psi psi'] E[psi']^-2` of the residuals, times the mean weight.
     fn factor(&self) -> Option<T> {
-        (self.slopes > T::ZERO).then(|| self.squares * self.weights / (self.slopes * self.slopes))
+        (self.slopes > T::ZERO)
+            .then(|| self.fitted() * self.squares * self.weights / (self.slopes * self.slopes))
+    }
+
+    /// By how much two residuals a correspondence are too small about a model of eight parameters fitted to them.
+    fn fitted(&self) -> T {
+        let n = core::cmp::max(self.count, 5);
+        from_u32::<T>(n) / from_u32::<T>(n - 4)
     }
 
     /// Variance of one coordinate's noise.
     pub(super) fn variance(&self) -> T {
-        if self.slopes > T::ZERO { self.squares / self.slopes } else { T::ZERO }
+        if self.slopes > T::ZERO { self.fitted() * self.squares / self.slopes } else { T::ZERO }
     }
 }
 
