@@ -12,7 +12,7 @@ use crate::robust::loss::Loss;
 use crate::robust::{Estimator, Gate, Score, ScoreCounts, Tally};
 use crate::solvers::{abspose_upright_2pt, p3p};
 
-use super::Gravity;
+use super::search::Gravity;
 
 /// Blocks scored between two looks at the gate.
 const CHUNK: usize = 2;

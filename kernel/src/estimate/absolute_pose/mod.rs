@@ -1,116 +1,32 @@
 //! The pose of a calibrated camera from pixels of known points.
-//!
-//! Longer than other files: options, error, entry points and the judgement share one flow, whose pieces no other file calls.
 
-use core::fmt;
+use nalgebra::{Vector2, Vector3};
 
-use nalgebra::{Matrix6, Vector2, Vector3};
-
-use super::Unobservable;
-use super::prior::{Direction, PriorFit};
-use crate::geometry::pose::{skew, upright};
-use crate::geometry::{CameraModel, Pose};
-use crate::linalg::{LANES, Ldlt};
-use crate::real::{abs, from_u32, is_finite, lit, ln, max, sqrt};
-use crate::refine::blocks::{Block, BlockSlice};
-use crate::refine::reprojection::{BearingPointBlock, CameraPose, PlanePointBlock, ReprojectionBlock};
+use crate::geometry::CameraModel;
+use crate::linalg::LANES;
+use crate::real::{from_u32, is_finite, lit};
+use crate::refine::blocks::Block;
+use crate::refine::reprojection::{BearingPointBlock, PlanePointBlock};
+use crate::robust::Guide;
 use crate::robust::budget::check_noise;
-use crate::robust::loss::Loss;
-use crate::robust::{
-    Consensus, Guide, OptionsError, RansacOptions, iterations_needed, log_binomial_tail, rank_by_score,
-    ransac,
-};
-use crate::{InputError, Real, Solutions};
+use crate::{InputError, Real};
 
 mod hypothesis;
+mod judge;
+mod options;
+mod search;
 mod shape;
 mod verdict;
 mod workspace;
 
-use hypothesis::{PoseProblem, UprightProblem};
-use shape::{Shape, shape_of_inliers};
+use judge::{Task, estimate};
+pub use options::{AbsolutePoseError, AbsolutePoseOptions, GravityPrior};
+use search::Gravity;
 pub use verdict::{AbsolutePose, AbsolutePoseEstimate, AbsolutePoseVerdict};
 pub use workspace::{AbsolutePoseStorage, AbsolutePoseWorkspace, WideAbsolutePoseStorage};
 
-/// Gravity as an inertial unit knows it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GravityPrior<T: Real> {
-    /// Its direction in the world's frame, of any length.
-    pub world: Vector3<T>,
-    /// Its direction in the camera's frame, of any length.
-    pub camera: Vector3<T>,
-    /// Standard deviation of the angle between the two, rad.
-    pub sigma_rad: T,
-}
-
-/// Options of [`absolute_pose`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct AbsolutePoseOptions<T: Real> {
-    /// Largest reprojection error of an inlier, pixels. Default 2.
-    pub max_error_px: T,
-    /// Standard deviation of the noise of one image coordinate, pixels. Default: half of `max_error_px`.
-    pub sigma_px: Option<T>,
-    /// Gravity, if known: then samples are of two correspondences instead of three, and it enters the refinement. A
-    /// prior that contradicts the correspondences is left aside and reported. Default none.
-    pub gravity: Option<GravityPrior<T>>,
-    /// Confidence, iterations, budgets and seed.
-    pub ransac: RansacOptions<T>,
-}
-
-impl<T: Real> Default for AbsolutePoseOptions<T> {
-    fn default() -> Self {
-        Self { max_error_px: T::TWO, sigma_px: None, gravity: None, ransac: RansacOptions::default() }
-    }
-}
-
-/// Malformed input or options. Outputs are untouched.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum AbsolutePoseError {
-    /// The correspondences cannot be used.
-    Input(InputError),
-    /// An option is out of its range.
-    Options(OptionsError),
-    /// A direction of the gravity prior has no length or is not finite, or its uncertainty is not positive and finite.
-    Gravity,
-}
-
-impl fmt::Display for AbsolutePoseError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Input(error) => error.fmt(f),
-            Self::Options(error) => error.fmt(f),
-            Self::Gravity => f.write_str("the gravity prior needs two directions and a positive uncertainty"),
-        }
-    }
-}
-
-impl core::error::Error for AbsolutePoseError {}
-
-impl From<InputError> for AbsolutePoseError {
-    fn from(error: InputError) -> Self {
-        Self::Input(error)
-    }
-}
-
-impl From<OptionsError> for AbsolutePoseError {
-    fn from(error: OptionsError) -> Self {
-        Self::Options(error)
-    }
-}
-
 /// The fewest correspondences: three leave up to four poses.
 const NEEDED: usize = 4;
-/// A second pose of a plane is told from the first if it is this much less likely (the logarithm of 100).
-const LOG_ODDS: f64 = 4.6;
-/// A consensus is believed if chance makes one like it with less than this probability (the logarithm of 5 %).
-const LOG_CHANCE: f64 = -3.0;
-/// Samples drawn at the most to find out that the points lie behind the camera.
-const MAX_BEHIND: u32 = 300;
-/// Standard deviations beyond which a prior is contradicted.
-const PRIOR_SIGMAS: f64 = 4.0;
 
 /// The pose of a camera from pixels of known points, many of which may be wrong, or why there is none.
 ///
@@ -306,247 +222,4 @@ fn fill<T: Real, B: Block<T>, const W: usize>(numbers: &mut [T], mut from: impl 
             block.write_lane(lane, &numbers);
         }
     }
-}
-
-/// A gravity prior, checked.
-#[derive(Clone, Copy, Debug)]
-struct Gravity<T: Real> {
-    direction: Direction<T>,
-    /// Weight of the squared chord between the two, px^2.
-    weight: T,
-    sigma_rad: T,
-}
-
-impl<T: Real> Gravity<T> {
-    fn new(prior: &GravityPrior<T>, sigma_px: T) -> Option<Self> {
-        if !(is_finite(prior.sigma_rad) && prior.sigma_rad > T::ZERO) {
-            return None;
-        }
-        let ratio = sigma_px / prior.sigma_rad;
-        let direction = Direction::new(&prior.world, &prior.camera)?;
-        Some(Self { direction, weight: ratio * ratio, sigma_rad: prior.sigma_rad })
-    }
-
-    /// The angle between the two in standard deviations.
-    fn deviation(&self, pose: &CameraPose<T>) -> T {
-        self.direction.turn_between(&pose.rotation) / self.sigma_rad
-    }
-}
-
-/// What is asked of the loaded correspondences.
-struct Task<'a, T: Real> {
-    options: &'a AbsolutePoseOptions<T>,
-    sigma_px: T,
-    gravity: Option<Gravity<T>>,
-    /// Subtracted from the points.
-    mean: Vector3<T>,
-}
-
-/// The verdict on loaded correspondences.
-fn estimate<T: Real, B: ReprojectionBlock<T>>(
-    task: &Task<'_, T>,
-    focal: [T; 2],
-    guide: Guide<'_, T>,
-    workspace: &mut AbsolutePoseWorkspace<'_, T>,
-) -> AbsolutePoseEstimate<T> {
-    let count = workspace.count;
-    let blocks = B::slice(workspace.numbers);
-    let data = BlockSlice { blocks: blocks.get(..count.div_ceil(LANES)).unwrap_or(blocks), count };
-    let problem = PoseProblem::new(data, focal, task.options.max_error_px);
-    let order = match guide.scores {
-        Some(scores) => {
-            rank_by_score(scores, workspace.order);
-            workspace.order.get(..count)
-        }
-        None => None,
-    };
-    let (consensus, gravity) = search(task, &problem, order, guide.keep_going);
-    workspace.inliers.iter_mut().take(count).for_each(|inlier| *inlier = false);
-    let mut estimate = AbsolutePoseEstimate {
-        verdict: AbsolutePoseVerdict::NoConsensus,
-        gravity: None,
-        noise_px: T::ZERO,
-        report: consensus.report,
-    };
-    let found = consensus.models[0].map(|(model, _)| model);
-    let believed = found.filter(|_| beyond_chance(task, &problem, &consensus));
-    // Points behind the camera show a depth-reversed shape that a part of them fits in front, too.
-    let few = 2 * consensus.report.inliers < count as u32;
-    if few && behind_camera(task, &problem, &consensus) {
-        estimate.verdict = AbsolutePoseVerdict::BehindCamera;
-        return estimate;
-    }
-    let Some(model) = believed else {
-        if found.is_some() && consensus.report.inliers > 3 {
-            estimate.verdict = AbsolutePoseVerdict::TooFewInliers;
-        }
-        return estimate;
-    };
-    estimate.gravity = gravity;
-    let gravity = match gravity {
-        Some(PriorFit::Fits(_)) => task.gravity.as_ref(),
-        _ => None,
-    };
-    let loss = Loss::Truncated(problem.threshold);
-    let best = problem.optimise(&model, &loss, gravity, 12, lit(1e-6));
-    let mut mask = workspace.inliers.iter_mut();
-    problem.for_each_block(&best.model, |_, relative, filled| {
-        for (inlier, &s) in mask.by_ref().take(filled).zip(relative) {
-            *inlier = s < T::ONE;
-        }
-    });
-    let finish = |pose: &CameraPose<T>, sums: &crate::refine::lm::NormalEquations<T, 6>| {
-        let variance = variance(task, &problem, sums);
-        let active = from_u32::<T>(core::cmp::max(sums.active, 1));
-        AbsolutePose {
-            pose: shifted(&pose.pose(), &task.mean),
-            covariance: covariance(&sums.hessian, variance, &(pose.rotation * task.mean)),
-            rms_px: sqrt(squares(&problem, sums) / active),
-        }
-    };
-    let first = finish(&best.model, &best.equations);
-    estimate.noise_px = sqrt(variance(task, &problem, &best.equations));
-    estimate.verdict = match shape_of_inliers(&problem, &best.model) {
-        Shape::Repeated => AbsolutePoseVerdict::Unobservable(Unobservable::TooFewDistinct),
-        Shape::Line => AbsolutePoseVerdict::Unobservable(Unobservable::Collinear),
-        Shape::Volume => AbsolutePoseVerdict::Pose(first),
-        Shape::Flat { twin } => {
-            let second = problem.optimise(&twin, &loss, gravity, 20, lit(1e-6));
-            let turned = (second.model.rotation - best.model.rotation).norm_squared();
-            let moved = (second.model.translation - best.model.translation).norm_squared();
-            let same = turned < lit(1e-4) && moved < lit::<T>(1e-4) * best.model.translation.norm_squared();
-            let noise = estimate.noise_px * estimate.noise_px;
-            let worse = second.equations.cost - best.equations.cost;
-            if !same && worse < lit::<T>(2.0 * LOG_ODDS) * max(noise, T::MIN_POSITIVE) {
-                let mut poses = Solutions::new();
-                let second = finish(&second.model, &second.equations);
-                let (first, second) = if worse < T::ZERO { (second, first) } else { (first, second) };
-                poses.push(first);
-                poses.push(second);
-                AbsolutePoseVerdict::PlanarAmbiguity(poses)
-            } else {
-                AbsolutePoseVerdict::Pose(first)
-            }
-        }
-    };
-    estimate
-}
-
-/// The consensus by what priors there are, and what became of the prior.
-fn search<T: Real, B: ReprojectionBlock<T>>(
-    task: &Task<'_, T>,
-    problem: &PoseProblem<'_, T, B>,
-    order: Option<&[u32]>,
-    mut keep_going: Option<&mut dyn FnMut(&crate::robust::Progress) -> bool>,
-) -> (Consensus<CameraPose<T>, T>, Option<PriorFit<T>>) {
-    let options = &task.options.ransac;
-    let Some(gravity) = &task.gravity else {
-        return (ransac::<T, _, 3>(problem, options, order, NEEDED as u32, keep_going), None);
-    };
-    let deviations_of = |consensus: &Consensus<CameraPose<T>, T>| {
-        consensus.models[0].map_or(T::MAX, |(model, _)| gravity.deviation(&model))
-    };
-    let limit = lit(PRIOR_SIGMAS);
-    let upright_frame = |v: &Vector3<T>| upright(v).unwrap_or_else(nalgebra::Matrix3::identity);
-    let aided = UprightProblem {
-        problem: *problem,
-        world: upright_frame(&gravity.direction.from),
-        camera: upright_frame(&gravity.direction.to),
-    };
-    // Reborrowed, for the second search may need it.
-    let again = keep_going.as_mut().map(|ask| &mut **ask as &mut dyn FnMut(&_) -> bool);
-    let first = ransac::<T, _, 2>(&aided, options, order, NEEDED as u32, again);
-    let deviations = deviations_of(&first);
-    // Where less than 30 % agree, or the optimum has left the prior, the prior must win against a search without it.
-    let share = from_u32::<T>(first.report.inliers) / from_u32(problem.data.count as u32);
-    if deviations < limit && share > lit(0.3) {
-        return (first, Some(PriorFit::Fits(deviations)));
-    }
-    let second = ransac::<T, _, 3>(problem, options, order, NEEDED as u32, keep_going);
-    let chosen = if second.report.cost < first.report.cost { second } else { first };
-    let deviations = deviations_of(&chosen);
-    let fit =
-        if deviations < limit { PriorFit::Fits(deviations) } else { PriorFit::Contradicted(deviations) };
-    (chosen, chosen.models[0].map(|_| fit))
-}
-
-/// True where the consensus is larger than what wrong correspondences make up.
-fn beyond_chance<T: Real, B: ReprojectionBlock<T>>(
-    task: &Task<'_, T>,
-    problem: &PoseProblem<'_, T, B>,
-    consensus: &Consensus<CameraPose<T>, T>,
-) -> bool {
-    let report = &consensus.report;
-    if (report.inliers as usize) < NEEDED {
-        return false;
-    }
-    // A wrong pose puts a point within the threshold of its pixel as often as the disc's share of the image's extent.
-    let mut extent = T::ZERO;
-    let zero = CameraPose { rotation: nalgebra::Matrix3::zeros(), translation: Vector3::z() };
-    problem.for_each_block(&zero, |block, _, filled| {
-        for l in 0..filled {
-            let [a, b, _] = block.rows(l, problem.focal);
-            let size = max(abs(a[2]), abs(b[2]));
-            extent = if size > extent { size } else { extent };
-        }
-    });
-    let radius = task.options.max_error_px / max(extent, task.options.max_error_px * T::TWO);
-    let chance = radius * radius;
-    let tried = from_u32::<T>(core::cmp::max(report.spent.hypotheses, 1));
-    let tail = log_binomial_tail(problem.data.count as u32 - 3, report.inliers - 3, chance);
-    ln(tried) + tail < lit(LOG_CHANCE)
-}
-
-/// True where poses with the points behind the camera find a consensus twice as large as the one in front.
-fn behind_camera<T: Real, B: ReprojectionBlock<T>>(
-    task: &Task<'_, T>,
-    problem: &PoseProblem<'_, T, B>,
-    in_front: &Consensus<CameraPose<T>, T>,
-) -> bool {
-    let count = problem.data.count as u32;
-    let wanted = core::cmp::max(2 * in_front.report.inliers, NEEDED as u32);
-    let mirrored = PoseProblem { facing: -T::ONE, ..*problem };
-    let mut options = task.options.ransac;
-    let needed = iterations_needed(options.confidence, wanted, count, 3);
-    options.budget.max_iterations =
-        core::cmp::min(options.budget.max_iterations, core::cmp::min(needed, MAX_BEHIND));
-    let behind = ransac::<T, _, 3>(&mirrored, &options, None, wanted, None);
-    behind.report.inliers >= wanted && beyond_chance(task, &mirrored, &behind)
-}
-
-/// The sum of the inliers' squared residuals, px^2.
-fn squares<T: Real, B: ReprojectionBlock<T>>(
-    problem: &PoseProblem<'_, T, B>,
-    sums: &crate::refine::lm::NormalEquations<T, 6>,
-) -> T {
-    let outside = from_u32::<T>((problem.data.count as u32).saturating_sub(sums.active));
-    max(sums.cost - outside * problem.threshold * problem.threshold, T::ZERO)
-}
-
-/// The variance of an image coordinate: of the residuals if there are enough, otherwise the one assumed.
-fn variance<T: Real, B: ReprojectionBlock<T>>(
-    task: &Task<'_, T>,
-    problem: &PoseProblem<'_, T, B>,
-    sums: &crate::refine::lm::NormalEquations<T, 6>,
-) -> T {
-    let freedom = (2 * sums.active).saturating_sub(6);
-    if freedom < 10 { task.sigma_px * task.sigma_px } else { squares(problem, sums) / from_u32(freedom) }
-}
-
-/// The covariance for points that are not counted from their mean: `t = t' - R mean`.
-fn covariance<T: Real>(hessian: &Matrix6<T>, variance: T, turned_mean: &Vector3<T>) -> Option<Matrix6<T>> {
-    let about_mean = Ldlt::new(hessian)?.inverse() * variance;
-    let mut j = Matrix6::identity();
-    let lever = skew(turned_mean);
-    for p in 0..3 {
-        for q in 0..3 {
-            j.data.0[q][3 + p] = lever.data.0[q][p];
-        }
-    }
-    Some(j * about_mean * j.transpose())
-}
-
-fn shifted<T: Real>(pose: &Pose<T>, mean: &Vector3<T>) -> Pose<T> {
-    let translation = pose.translation.vector - pose.rotation * mean;
-    Pose::from_parts(nalgebra::Translation3::from(translation), pose.rotation)
 }

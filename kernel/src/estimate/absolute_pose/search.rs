@@ -1,0 +1,79 @@
+//! The search for a consensus: by the gravity prior first where there is one, and without it where that fails.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::super::prior::{Direction, PriorFit};
+use super::NEEDED;
+use super::hypothesis::{PoseProblem, UprightProblem};
+use super::options::GravityPrior;
+use crate::Real;
+use crate::geometry::pose::upright;
+use crate::real::{from_u32, is_finite, lit};
+use crate::refine::reprojection::{CameraPose, ReprojectionBlock};
+use crate::robust::{Consensus, Progress, RansacOptions, ransac};
+
+/// Standard deviations beyond which a prior is contradicted.
+const PRIOR_SIGMAS: f64 = 4.0;
+
+/// A gravity prior, checked.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gravity<T: Real> {
+    pub(super) direction: Direction<T>,
+    /// Weight of the squared chord between the two, px^2.
+    pub(super) weight: T,
+    sigma_rad: T,
+}
+
+impl<T: Real> Gravity<T> {
+    pub(super) fn new(prior: &GravityPrior<T>, sigma_px: T) -> Option<Self> {
+        if !(is_finite(prior.sigma_rad) && prior.sigma_rad > T::ZERO) {
+            return None;
+        }
+        let ratio = sigma_px / prior.sigma_rad;
+        let direction = Direction::new(&prior.world, &prior.camera)?;
+        Some(Self { direction, weight: ratio * ratio, sigma_rad: prior.sigma_rad })
+    }
+
+    /// The angle between the two in standard deviations.
+    fn deviation(&self, pose: &CameraPose<T>) -> T {
+        self.direction.turn_between(&pose.rotation) / self.sigma_rad
+    }
+}
+
+/// The consensus by what priors there are, and what became of the prior.
+pub(super) fn search<T: Real, B: ReprojectionBlock<T>>(
+    options: &RansacOptions<T>,
+    gravity: Option<&Gravity<T>>,
+    problem: &PoseProblem<'_, T, B>,
+    order: Option<&[u32]>,
+    mut keep_going: Option<&mut dyn FnMut(&Progress) -> bool>,
+) -> (Consensus<CameraPose<T>, T>, Option<PriorFit<T>>) {
+    let Some(gravity) = gravity else {
+        return (ransac::<T, _, 3>(problem, options, order, NEEDED as u32, keep_going), None);
+    };
+    let deviations_of = |consensus: &Consensus<CameraPose<T>, T>| {
+        consensus.models[0].map_or(T::MAX, |(model, _)| gravity.deviation(&model))
+    };
+    let limit = lit(PRIOR_SIGMAS);
+    let upright_frame = |v: &Vector3<T>| upright(v).unwrap_or_else(Matrix3::identity);
+    let aided = UprightProblem {
+        problem: *problem,
+        world: upright_frame(&gravity.direction.from),
+        camera: upright_frame(&gravity.direction.to),
+    };
+    // Reborrowed, for the second search may need it.
+    let again = keep_going.as_mut().map(|ask| &mut **ask as &mut dyn FnMut(&_) -> bool);
+    let first = ransac::<T, _, 2>(&aided, options, order, NEEDED as u32, again);
+    let deviations = deviations_of(&first);
+    // Where less than 30 % agree, or the optimum has left the prior, the prior must win against a search without it.
+    let share = from_u32::<T>(first.report.inliers) / from_u32(problem.data.count as u32);
+    if deviations < limit && share > lit(0.3) {
+        return (first, Some(PriorFit::Fits(deviations)));
+    }
+    let second = ransac::<T, _, 3>(problem, options, order, NEEDED as u32, keep_going);
+    let chosen = if second.report.cost < first.report.cost { second } else { first };
+    let deviations = deviations_of(&chosen);
+    let fit =
+        if deviations < limit { PriorFit::Fits(deviations) } else { PriorFit::Contradicted(deviations) };
+    (chosen, chosen.models[0].map(|_| fit))
+}
