@@ -145,33 +145,21 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
     /// explained and the choice of those, on so many of the `blocks`; none where they leave one open, or where less than half
     /// of them turn.
     pub(super) fn rotation(&self, pose: &PoseModel<T>, sigma: T, blocks: usize) -> Option<RotationModel<T>> {
-        let every = core::cmp::max(self.data.blocks.len().div_ceil(core::cmp::max(blocks, 1)), 1);
-        let view = self.view(pose);
         let mut model = RotationModel { rotation: pose.rotation, scales: pose.scales };
         let (s1, s2) = (pose.scales.inverse1(), pose.scales.inverse2());
         let mut limit: T = T::MAX;
         for factor in TURN_SIGMAS {
-            let h = model.matrix();
             let mut moment = Matrix3::zeros();
-            let (mut inliers, mut turned) = (0u32, 0u32);
-            let mut left = self.data.count;
-            for block in self.data.blocks.iter().step_by(every) {
-                let residual = self.squared(block, &view.matrix, view.scale);
-                let (plane, weight) = block.planes();
-                let squared = transfer_sq(&h, &plane, &weight);
+            let (inliers, turned) = self.turned(pose, &model, limit, blocks, |block, turned| {
                 let (f1, f2) = block.directions();
                 for l in 0..LANES {
-                    let inlier = l < left && residual[l] < T::ONE;
-                    inliers += inlier as u32;
-                    if inlier && squared[l] < limit {
-                        turned += 1;
+                    if turned[l] {
                         let v1 = Vector3::new(f1[0][l] * s1[0], f1[1][l] * s1[1], f1[2][l]);
                         let v2 = Vector3::new(f2[0][l] * s2[0], f2[1][l] * s2[1], f2[2][l]);
                         moment += v2 * v1.transpose();
                     }
                 }
-                left = left.saturating_sub(LANES * every);
-            }
+            });
             if 2 * turned < inliers {
                 return None;
             }
@@ -182,30 +170,47 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         Some(model)
     }
 
-    /// True where a rotation explains what a pose does: then the optima of poses are many, and none is better than the
-    /// others.
-    fn turns(&self, pose: &PoseModel<T>) -> bool {
-        let every = core::cmp::max(self.data.blocks.len().div_ceil(TURNED_BLOCKS), 1);
-        // A threshold is two standard deviations.
-        let Some(rotation) = self.rotation(pose, self.threshold * T::HALF, TURNED_BLOCKS) else {
-            return false;
-        };
-        let limit = self.threshold * self.threshold * lit(EXPLAINED_SIGMAS * EXPLAINED_SIGMAS * 0.25);
-        let h = rotation.matrix();
-        let view = self.view(pose);
+    /// How many inliers of a pose there are, and how many of them a rotation explains up to a squared transfer error, on so
+    /// many of the `blocks`; calls `each` with those of a block.
+    #[inline]
+    fn turned(
+        &self,
+        pose: &PoseModel<T>,
+        rotation: &RotationModel<T>,
+        limit: T,
+        blocks: usize,
+        mut each: impl FnMut(&B, &[bool; LANES]),
+    ) -> (u32, u32) {
+        let every = core::cmp::max(self.data.blocks.len().div_ceil(core::cmp::max(blocks, 1)), 1);
+        let (view, h) = (self.view(pose), rotation.matrix());
         let (mut inliers, mut turned) = (0u32, 0u32);
         let mut left = self.data.count;
         for block in self.data.blocks.iter().step_by(every) {
             let residual = self.squared(block, &view.matrix, view.scale);
             let (plane, weight) = block.planes();
             let squared = transfer_sq(&h, &plane, &weight);
+            let mut explained = [false; LANES];
             for l in 0..LANES {
                 let inlier = l < left && residual[l] < T::ONE;
+                explained[l] = inlier && squared[l] < limit;
                 inliers += inlier as u32;
-                turned += (inlier && squared[l] < limit) as u32;
+                turned += explained[l] as u32;
             }
+            each(block, &explained);
             left = left.saturating_sub(LANES * every);
         }
+        (inliers, turned)
+    }
+
+    /// True where a rotation explains what a pose does: then the optima of poses are many, and none is better than the
+    /// others.
+    fn turns(&self, pose: &PoseModel<T>) -> bool {
+        // A threshold is two standard deviations.
+        let Some(rotation) = self.rotation(pose, self.threshold * T::HALF, TURNED_BLOCKS) else {
+            return false;
+        };
+        let limit = self.threshold * self.threshold * lit(EXPLAINED_SIGMAS * EXPLAINED_SIGMAS * 0.25);
+        let (inliers, turned) = self.turned(pose, &rotation, limit, TURNED_BLOCKS, |_, _| ());
         turned * 10 >= inliers * 9
     }
 
