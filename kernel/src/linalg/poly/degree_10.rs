@@ -122,7 +122,7 @@ impl<T: Real> LeastDetermined<T> {
 #[inline]
 #[must_use]
 pub fn real_roots_10<T: Real>(c: &[T; 11], error: T) -> RealRoots10<T> {
-    roots_in_chart(c, error, None)
+    roots_in_chart::<T, BATCH>(c, error, None)
 }
 
 /// The real roots on the whole projective line: those in [-1, 1], and the reciprocals of the others (0 is the root at
@@ -134,11 +134,15 @@ pub fn projective_roots_10<T: Real>(c: &[T; 11], error: T) -> [RealRoots10<T>; 2
     reversed.reverse();
     // Both charts must agree on the sign at 1 and -1, or a root there would be found twice or never.
     let ends = [bernstein(c, T::ONE)[10], bernstein(c, -T::ONE)[10]];
-    [roots_in_chart(c, error, Some(ends)), roots_in_chart(&reversed, error, Some(ends))]
+    [c, &reversed].map(|c| roots_in_chart::<T, BATCH>(c, error, Some(ends)))
 }
 
 #[inline(never)]
-fn roots_in_chart<T: Real>(c: &Coefficients<T>, error: T, ends: Option<[T; 2]>) -> RealRoots10<T> {
+fn roots_in_chart<T: Real, const L: usize>(
+    c: &Coefficients<T>,
+    error: T,
+    ends: Option<[T; 2]>,
+) -> RealRoots10<T> {
     let mut size = T::ZERO;
     for &v in c {
         size += abs(v);
@@ -156,7 +160,7 @@ fn roots_in_chart<T: Real>(c: &Coefficients<T>, error: T, ends: Option<[T; 2]>) 
         }
         isolate(c, side, b, error, &mut waiting, &mut brackets);
     }
-    polish::<T, BATCH>(c, &brackets, error)
+    polish::<T, L>(c, &brackets, error)
 }
 
 /// Bernstein coefficients on [0, 1] of the polynomial in `t = side * x`.
@@ -412,4 +416,29 @@ fn polish<T: Real, const L: usize>(c: &Coefficients<T>, brackets: &Brackets<T>, 
         left = left.saturating_sub(L);
     }
     RealRoots10 { roots, len: brackets.len, worst }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::roots_in_chart;
+
+    #[test]
+    fn roots_have_the_same_bits_one_and_four_at_a_time() {
+        let mut word = 1u64;
+        let mut several = 0;
+        for _ in 0..2000 {
+            let c = core::array::from_fn(|_| {
+                word = word.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+                (word >> 40) as f32 / (1u32 << 23) as f32 - 1.0
+            });
+            let one = roots_in_chart::<f32, 1>(&c, 1e-6, None);
+            let four = roots_in_chart::<f32, 4>(&c, 1e-6, None);
+            let bits =
+                |roots: &[f32]| roots.iter().fold(0u64, |h, x| h.rotate_left(7) ^ u64::from(x.to_bits()));
+            assert_eq!(one.as_slice().len(), four.as_slice().len());
+            assert_eq!(bits(one.as_slice()), bits(four.as_slice()), "{c:?}");
+            several += usize::from(one.as_slice().len() > 1);
+        }
+        assert!(several > 200, "{several}");
+    }
 }
