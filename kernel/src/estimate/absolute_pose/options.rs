@@ -18,7 +18,7 @@ pub struct GravityPrior<T: Real> {
     pub sigma_rad: T,
 }
 
-/// Options of [`absolute_pose`].
+/// Options of [`absolute_pose`](super::absolute_pose()).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct AbsolutePoseOptions<T: Real> {
