@@ -134,7 +134,8 @@ pub fn projective_roots_10<T: Real>(c: &[T; 11], error: T) -> [RealRoots10<T>; 2
     reversed.reverse();
     // Both charts must agree on the sign at 1 and -1, or a root there would be found twice or never.
     let ends = [bernstein(c, T::ONE)[10], bernstein(c, -T::ONE)[10]];
-    [c, &reversed].map(|c| roots_in_chart::<T, BATCH>(c, error, Some(ends)))
+    let roots = |c: &_| roots_in_chart::<T, BATCH>(c, error, Some(ends));
+    [roots(c), roots(&reversed)]
 }
 
 #[inline(never)]
