@@ -7,7 +7,7 @@
 use nalgebra::Vector3;
 
 use crate::Real;
-use crate::real::{abs, lit, max, min, sqrt};
+use crate::real::{abs, lit, max, sqrt};
 
 /// Newton steps allowed for a root; five are usual, a start far from a triple root gains a factor 2/3 a step.
 const MAX_STEPS: usize = 40;
@@ -30,7 +30,7 @@ pub(crate) fn real_root_of_cubic<T: Real>(c2: T, c1: T, c0: T, last_step: T) -> 
     // Beyond the root: for p > 0 the root of the parabola that touches at the extremum, else (mean inequality)
     // t^3 - 3 p t >= 2 sqrt(-3 p) t^2 > 3 sqrt(-p) t^2. One formula for both, without a branch.
     let size = abs(p);
-    let extremum = sqrt(max(size, T::EPSILON * (T::ONE + c2 * c2)));
+    let extremum = sqrt(max(size, T::EPSILON * (c2 * c2) + T::MIN_POSITIVE));
     let above = if p > T::ZERO { extremum } else { T::ZERO };
     let t = above + sqrt((abs(q) / extremum + (size + p)) * lit::<T>(1.0 / 3.0));
     let mut x = if q > T::ZERO { centre - t } else { centre + t };
@@ -43,7 +43,7 @@ pub(crate) fn real_root_of_cubic<T: Real>(c2: T, c1: T, c0: T, last_step: T) -> 
         f * (square - product) / (slope * (square - product - product) + f * f)
     };
     x -= step(x);
-    let tolerance = last_step * min(t, T::ONE + abs(x));
+    let tolerance = last_step * t;
     for _ in 0..MAX_STEPS {
         let step = step(x);
         x -= step;
@@ -62,8 +62,10 @@ pub(crate) fn lines_of_conic<T: Real>([c00, c01, c02, c11, c12, c22]: [T; 6]) ->
     // larger gives the smaller without cancellation.
     let a11 = c02 * c02 - c00 * c22;
     let a22 = c01 * c01 - c00 * c11;
-    let root = sqrt(max(max(a11, a22), T::MIN_POSITIVE));
-    let other = (c12 * c00 - c01 * c02) / root;
+    let larger = max(max(a11, a22), T::MIN_POSITIVE);
+    let root = sqrt(larger);
+    // Over the root, without waiting for it.
+    let other = (c12 * c00 - c01 * c02) * (T::ONE / larger) * root;
     let v1 = if a22 > a11 { other } else { root };
     let v2 = if a11 >= a22 { other } else { root };
     // c + [v]x = 2 q p': rank one, its first row and first column are the lines.

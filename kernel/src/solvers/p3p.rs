@@ -12,7 +12,7 @@ use crate::real::{abs, lit, max, min, sqrt};
 use crate::{Real, Solutions};
 
 /// Newton steps on the three distances.
-const MAX_REFINEMENTS: usize = 4;
+const MAX_REFINEMENTS: usize = 5;
 
 /// The up to four poses of a camera that sees three known points along given bearings.
 ///
@@ -31,16 +31,16 @@ const MAX_REFINEMENTS: usize = 4;
 /// are admitted: one point hides the other.
 ///
 /// # Accuracy
-/// Noise-free, any pose, depth 2 to 20: `f64` 100 % within 1e-6 rad (99th percentile 1e-13); `f32` 99.7 to 99.9 % within
-/// 1e-3 rad, where an exact solver of the rounded input reaches 99.99 %.
+/// Noise-free, any pose, depth 2 to 20: `f64` 100 % within 1e-6 rad (99th percentile 1e-13); `f32` 99.9 %
+/// within 1e-3 rad, where an exact solver of the rounded input reaches 99.99 %.
 ///
 /// # Cost
-/// Two or three steps on a cubic, two quadratics, and for each solution one or two Newton steps of at most four.
+/// Two or three steps on a cubic, two quadratics, and for each solution one or two Newton steps of at most five.
 ///
 /// # References
 /// Y. Ding, J. Yang, V. Larsson, C. Olsson, K. Astrom, "Revisiting the P3P Problem", CVPR 2023. Here the cubic's best
-/// conditioned root is found without trigonometry, angles enter as chords, which keeps their digits in `f32`, and the
-/// distances are refined on the original equations.
+/// conditioned root is found without trigonometry, each line is solved for the distance that it fixes best, angles enter
+/// as chords, which keeps their digits in `f32`, and the distances are refined on the original equations.
 ///
 /// # Examples
 /// ```
@@ -69,28 +69,33 @@ pub fn p3p<T: Real>(bearings: &[Vector3<T>; 3], points: &[Vector3<T>; 3]) -> Sol
     // 2 (m01 m02 m12 - 1)
     let w = T::TWO * ((u01 * u02 - u01 - u02) * m12 - u12);
 
-    // det(D01 + s D02) = k3 s^3 + k2 s^2 + k1 s + k0, D0i the conic of a12 |d0 x0 - di xi|^2 = a0i |d1 x1 - d2 x2|^2
-    let inverse = T::ONE / a12;
-    let (a, b) = (a01 * inverse, a02 * inverse);
-    let (as12, bs12) = (a * s12, b * s12);
-    let k3 = b * (bs12 - s02);
-    let k2 = (T::ONE - a) * s02 + b * (T::TWO * as12 + bs12 + w);
-    let k1 = (T::ONE - b) * s01 + a * (T::TWO * bs12 + as12 + w);
-    let k0 = a * (as12 - s01);
-    // A leading coefficient of zero (an isosceles triangle seen as one) is a root at infinity: one serves whose seventh
-    // power is still finite.
-    let least = T::EPSILON * lit::<T>(64.0) * (abs(k2) + abs(k1) + abs(k0));
-    let k3 = if abs(k3) > least { k3 } else { least };
-    let inverse = T::ONE / k3;
-    let root = real_root_of_cubic(k2 * inverse, k1 * inverse, k0 * inverse, lit(0.01));
+    // det(D01 + s D02) = k3 s^3 + k2 s^2 + k1 s + k0, D0i the conic of c |d0 x0 - di xi|^2 = a0i |d1 x1 - d2 x2|^2, and the
+    // squared sides divided by their sum, so that no power below overflows.
+    let total = a01 + a02 + a12;
+    let inverse = T::ONE / total;
+    let (a, b, c) = (a01 * inverse, a02 * inverse, a12 * inverse);
+    let (as12, bs12, cw) = (a * s12, b * s12, c * w);
+    let (cs01, cs02) = (c * s01, c * s02);
+    let k3 = b * (bs12 - cs02);
+    let k2 = (c - a) * cs02 + b * (T::TWO * as12 + bs12 + cw);
+    let k1 = (c - b) * cs01 + a * (T::TWO * bs12 + as12 + cw);
+    let k0 = a * (as12 - cs01);
+    // Of y = 3 k3 s the cubic has no leading coefficient to divide by: a root at infinity (an isosceles triangle seen as
+    // one) is no other case.
+    let k33 = lit::<T>(3.0) * k3;
+    let y = real_root_of_cubic(
+        lit::<T>(3.0) * k2,
+        k33 * lit::<T>(3.0) * k1,
+        k33 * k33 * lit::<T>(3.0) * k0,
+        lit(0.01),
+    );
     // The pair of lines s1 D01 + s2 D02; what follows takes fourth powers.
-    let (s1, s2) = if abs(root) > lit(1e3) { (T::ONE / root, T::ONE) } else { (T::ONE, root) };
-    let c00 = s1 + s2;
-    let (c01, c02) = (-s1 * m01, -s2 * m02);
+    let inverse = T::ONE / k33;
+    let (s1, s2) = if abs(y) < lit::<T>(1e3) * abs(k33) { (T::ONE, y * inverse) } else { (k33 / y, T::ONE) };
+    let (cs1, cs2) = (c * s1, c * s2);
+    let (c01, c02) = (-cs1 * m01, -cs2 * m02);
     let ab = s1 * a + s2 * b;
-    let (c11, c22) = (s1 - ab, s2 - ab);
-    let (am12, bm12) = (a * m12, b * m12);
-    let c12 = ab * m12;
+    let lines = lines_of_conic([cs1 + cs2, c01, c02, cs1 - ab, ab * m12, cs2 - ab]);
 
     // R maps (f1, f2, f1 x f2) to the same of the camera's points: R = [e1 e2 e1 x e2] [g1 g2 g3]'
     let normal = f1.cross(&f2);
@@ -98,52 +103,65 @@ pub fn p3p<T: Real>(bearings: &[Vector3<T>; 3], points: &[Vector3<T>; 3]) -> Sol
     let inverse = T::ONE / area;
     let g3 = normal * inverse;
     let (g1, g2) = (f2.cross(&g3), g3.cross(&f1));
-    let largest = max(max(a01, a02), a12);
-    if !(area > largest * largest * (T::EPSILON * T::EPSILON * lit::<T>(256.0))) {
+    if !(area > total * total * (T::EPSILON * T::EPSILON * lit::<T>(64.0))) {
         return solutions;
     }
 
     // The points of the two lines on the conic s2 D01 - s1 D02, the farthest from the pair. Nothing here branches: what is
     // not real becomes NaN and fails the last comparison.
+    let ba = s2 * a - s1 * b;
+    let (q00, q11, q22) = (cs2 - cs1, cs2 - ba, -cs1 - ba);
+    let (q01, q02, q12) = (-cs2 * m01, cs1 * m02, ba * m12);
     let mut candidates = [[T::ZERO; 3]; 4];
     let mut count = 0;
-    for line in lines_of_conic([c00, c01, c02, c11, c12, c22]) {
-        // l0 d0 = -(l1 d1 + l2 d2), then q2 d1^2 + 2 q1 d1 d2 + q0 d2^2 = 0
-        let (l0, l1, l2) = (line.x, line.y, line.z);
-        let (l00, l11, l22, l12) = (l0 * l0, l1 * l1, l2 * l2, l1 * l2);
-        let (m1, m2) = (m01 * l0, m02 * l0);
-        let q2 = s2 * (l11 + T::TWO * m1 * l1 + (T::ONE - a) * l00) - s1 * (l11 - b * l00);
-        let q1 = s2 * (l12 + m1 * l2 + am12 * l00) - s1 * (l12 + m2 * l1 + bm12 * l00);
-        let q0 = s2 * (l22 - a * l00) - s1 * (l22 + T::TWO * m2 * l2 + (T::ONE - b) * l00);
-        let (square, product) = (q1 * q1, q2 * q0);
+    for line in lines {
+        // d0 or d1, whichever the line fixes better, is e = -(lf f + lg g) of the other, f, and of d2 = g.
+        let swap = abs(line.y) > abs(line.x);
+        let in_order = |a: T, b: T| if swap { (b, a) } else { (a, b) };
+        let (le, lf) = in_order(line.x, line.y);
+        let (qee, qff) = in_order(q00, q11);
+        let (qeg, qfg) = in_order(q02, q12);
+        let inverse = T::ONE / le;
+        let (lf, lg) = (lf * inverse, line.z * inverse);
+        // t2 f^2 + 2 t1 f g + t0 g^2 = 0
+        let eef = qee * lf - q01;
+        let t2 = qff + lf * (eef - q01);
+        let t1 = qfg + lg * eef - qeg * lf;
+        let t0 = q22 + lg * (qee * lg - qeg - qeg);
+        let (square, product) = (t1 * t1, t2 * t0);
         let discriminant = square - product;
         // A double root may fall on either side of zero by rounding.
         let rounding = (square + abs(product)) * T::EPSILON * lit::<T>(64.0);
         let root = sqrt(max(discriminant, min(discriminant + rounding, T::ZERO)));
-        let q = if q1 > T::ZERO { -q1 - root } else { root - q1 };
-        let inverse = -T::ONE / l0;
-        let (w1, w2) = (l1 * inverse, l2 * inverse);
-        // d1 : d2
-        for (n1, n2) in [(q, q2), (q0, q)] {
-            let scale = sqrt(a12 / (n1 * n1 + n2 * n2 - T::TWO * m12 * (n1 * n2)));
-            let (d1, d2) = (abs(n1) * scale, abs(n2) * scale);
-            let d0 = w1 * d1 + w2 * d2;
+        let q = if t1 > T::ZERO { -t1 - root } else { root - t1 };
+        // f : g
+        for (n1, n2) in [(q, t2), (t0, q)] {
+            let (f, g) = (abs(n1), abs(n2));
+            let e = -(lf * f + lg * g);
+            let (d0, d1) = in_order(e, f);
             if let Some(candidate) = candidates.get_mut(count) {
-                *candidate = [d0, d1, d2];
+                *candidate = [d0, d1, g];
             }
-            count += usize::from((d0 > T::ZERO) & (n1 * n2 > T::ZERO));
+            count += usize::from((e > T::ZERO) & (n1 * n2 > T::ZERO));
         }
     }
 
+    let side = sqrt(a12);
+    let (h1, h2, h3) = (g1.dot(p0), g2.dot(p0), g3.dot(p0));
     for d in candidates.iter_mut().take(count) {
-        if !refine(d, [u01, u02, u12], [a01, a02, a12], largest) {
+        let [d0, d1, d2] = *d;
+        let e12 = d1 - d2;
+        let square = e12 * e12 + T::TWO * u12 * (d1 * d2);
+        let scale = side * sqrt(square) * (T::ONE / square);
+        *d = [d0 * scale, d1 * scale, d2 * scale];
+        if !refine(d, [u01, u02, u12], [a01, a02, a12], total) {
             continue;
         }
         let y0 = x0 * d[0];
         let (e1, e2) = (x1 * d[1] - y0, x2 * d[2] - y0);
         let e3 = e1.cross(&e2);
         let rotation = e1 * g1.transpose() + e2 * g2.transpose() + e3 * g3.transpose();
-        let translation = y0 - rotation * p0;
+        let translation = y0 - (e1 * h1 + e2 * h2 + e3 * h3);
         if let Some(pose) = pose::finite(pose::from_parts(&rotation, &translation)) {
             solutions.push(pose);
         }
@@ -153,11 +171,11 @@ pub fn p3p<T: Real>(bearings: &[Vector3<T>; 3], points: &[Vector3<T>; 3]) -> Sol
 
 /// Newton on the distances. False where they are no solution.
 #[inline]
-fn refine<T: Real>(d: &mut [T; 3], u: [T; 3], a: [T; 3], largest: T) -> bool {
+fn refine<T: Real>(d: &mut [T; 3], u: [T; 3], a: [T; 3], total: T) -> bool {
     let [u01, u02, u12] = u;
     let [a01, a02, a12] = a;
     // After a Newton step what remains of a residual is the square of the step.
-    let converged = largest * T::EPSILON * lit::<T>(32.0);
+    let converged = total * T::EPSILON * lit::<T>(16.0);
     for _ in 0..MAX_REFINEMENTS {
         let [d0, d1, d2] = *d;
         // |d0 x0 - d1 x1|^2 = (d0 - d1)^2 + 2 u01 d0 d1: no cancellation before the difference from a01
