@@ -92,7 +92,7 @@ impl<T: Real> Estimator<T, 2> for Location<T> {
         is_finite(a) && is_finite(b)
     }
 
-    fn polish(&self, model: &T, counts: &mut ScoreCounts) -> Option<T> {
+    fn polish(&self, model: &T, _bound: T, counts: &mut ScoreCounts) -> Option<T> {
         counts.residuals += 1;
         self.0.first().map(|x| *model + (*x - *model) * lit::<T>(1e-3))
     }
@@ -131,7 +131,7 @@ pub(crate) fn engine<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
     let location = Location(source.array());
     sink.flag(location.reject(&source.scalar()));
     sink.flag(location.settles(&source.scalar(), &mut 0));
-    sink.numbers(location.polish(&source.scalar(), &mut ScoreCounts::default()).iter());
+    sink.numbers(location.polish(&source.scalar(), T::MAX, &mut ScoreCounts::default()).iter());
     let consensus = ransac(&location, &options, None, 3, Some(&mut keep_going));
     for (model, score) in consensus.models.iter().flatten() {
         sink.number(*model);

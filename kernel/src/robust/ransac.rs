@@ -124,7 +124,7 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
             if !search.takes_hypothesis() {
                 return;
             }
-            let Some(model) = &estimator.polish(model, &mut search.counts) else { return };
+            let Some(model) = &estimator.polish(model, bound, &mut search.counts) else { return };
             search.gate.bound = bound;
             let Some(score) = estimator.score(model, &search.gate, &mut search.counts) else { return };
             if score.cost < search.minimal.cost {

@@ -16,7 +16,7 @@ use super::verdict::RelativePoseVerdict;
 use crate::Real;
 use crate::geometry::pose::upright;
 use crate::linalg::LANES;
-use crate::real::{abs, from_u32, lit, sqrt};
+use crate::real::{abs, from_u32, lit, max, sqrt};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock};
 use crate::refine::relative_pose::PoseModel;
 use crate::robust::loss::Loss;
@@ -28,6 +28,8 @@ use crate::solvers::{relpose_upright_3pt, translation_2pt};
 
 /// Blocks of the correspondences on which hypotheses are polished.
 const SUBSET: usize = 8;
+/// Passes over the data that lead from the pose with a prior to that without it: a step that fits is a small one.
+const UNAIDED_PASSES: u32 = 3;
 /// Passes over the data in a local optimisation.
 const LOCAL_PASSES: u32 = 6;
 /// The wide threshold is the narrow one and so many standard deviations of the prior.
@@ -143,8 +145,10 @@ impl<T: Real, B: EpipolarBlock<T>, K: Minimal<T, S>, const S: usize> Estimator<T
 {
     type Model = PoseModel<T>;
 
-    // The subset is looked at twice before.
-    const SCORE_PASSES: u32 = 4;
+    // A polished model lies where its optimum does.
+    const NEAR_MISSES: u32 = 2;
+    // The subset is looked at three times before.
+    const SCORE_PASSES: u32 = 5;
 
     fn count(&self) -> u32 {
         self.problem.data.count as u32
@@ -166,10 +170,18 @@ impl<T: Real, B: EpipolarBlock<T>, K: Minimal<T, S>, const S: usize> Estimator<T
         true
     }
 
-    fn polish(&self, model: &PoseModel<T>, counts: &mut ScoreCounts) -> Option<PoseModel<T>> {
+    fn polish(&self, model: &PoseModel<T>, bound: T, counts: &mut ScoreCounts) -> Option<PoseModel<T>> {
         let subset = self.subset(model);
         let data = BlockSlice { blocks: &subset, count: self.count };
         let (residuals, wide) = (&mut counts.residuals, self.wide);
+        // Of a model that may cost no more than the bound, at least so many lie within the narrow threshold, once polished.
+        let count = from_u32::<T>(self.problem.data.count as u32);
+        let share = T::ONE - bound / count;
+        let support = max(share * from_u32(self.count as u32), from_u32(self.support));
+        *residuals += self.count as u64;
+        if self.problem.within(data, model, wide) < support.to_u32() {
+            return None;
+        }
         let model = self.problem.approach(data, model, wide, 1, self.support, residuals)?;
         self.problem.approach(data, &model, wide * T::HALF, 1, 5, residuals)
     }
@@ -321,7 +333,8 @@ fn agreement<T: Real, B: EpipolarBlock<T>>(
 ) -> Option<PriorFit<T>> {
     match &judgement.verdict {
         RelativePoseVerdict::General(motion) => {
-            let (motion, _) = plain.motion(&plain.refine(&pose_model(&motion.pose, plain.problem)));
+            let model = plain.refine(&pose_model(&motion.pose, plain.problem), UNAIDED_PASSES);
+            let (motion, _) = plain.motion(&model, plain.noise(&model));
             known.agreement(&RelativePoseVerdict::General(motion))
         }
         verdict => known.agreement(verdict),

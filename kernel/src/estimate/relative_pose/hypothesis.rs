@@ -214,6 +214,19 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         turned * 10 >= inliers * 9
     }
 
+    /// How many correspondences of whole blocks lie within a threshold of a model, in front of the cameras or not.
+    pub(super) fn within(&self, data: BlockSlice<'_, B>, model: &PoseModel<T>, threshold: T) -> u32 {
+        let (matrix, limit) = (model.matrix(), threshold * threshold);
+        let mut count = 0;
+        for block in data.blocks.iter().take(data.count / LANES) {
+            let (c, d) = block.residual(&matrix);
+            for l in 0..LANES {
+                count += (c[l] * c[l] < limit * d[l]) as u32;
+            }
+        }
+        count
+    }
+
     /// At most `steps` Gauss-Newton steps towards the minimum of the errors truncated at `threshold`, on some of the blocks,
     /// without a look at where the last one leads; none where fewer than `least` are active or a direction is open.
     pub(super) fn approach(

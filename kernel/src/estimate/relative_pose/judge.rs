@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::super::chance::{ACCIDENTS, EXPLAINED_SIGMAS, beyond_chance, line_accident};
 use super::super::degenerate::{few_distinct, list, on_a_line};
-use super::covariance::{PsiSums, Spread, covariance, variance};
+use super::covariance::{PsiSums, covariance, variance};
 use super::evidence::{Evidence, Explained};
 use super::hypothesis::{PoseProblem, SAMPLED_BLOCKS};
 use super::verdict::{GeneralMotion, PureRotation, RelativePoseVerdict, Unobservable};
@@ -45,6 +45,8 @@ const PLANE_THRESHOLD: f64 = 1.25;
 /// lost; and the least and largest such place, in thresholds.
 const SUPPORT_SIGMAS: f64 = 6.0;
 const SUPPORT: [f64; 2] = [0.8, 2.6];
+/// Passes of the last refinement at the most.
+const REFINE_PASSES: u32 = 10;
 /// A plane must explain so many in twenty of the pose's inliers to be the verdict; of a planar scene it explains all but
 /// accidents.
 const PLANE_SHARE_OF_20: u32 = 17;
@@ -92,10 +94,9 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     fn verdict(&self, best: &PoseModel<T>, mask: &mut [bool], order: &mut [u32]) -> Judgement<T> {
         let problem = self.problem;
         let count = problem.data.count as u32;
-        let mut refined = self.refine(best);
+        let mut refined = self.refine(best, REFINE_PASSES);
         let accident = problem.accident(&refined, self.accident());
-        let inliers = self.mark(&refined, mask);
-        let noise = self.noise(&refined);
+        let (inliers, mut noise) = self.mark(&refined, mask);
         if !beyond_chance(count, inliers, 5, accident) {
             // Of points on one line even wrong pairs may agree.
             let indices = list(mask, order);
@@ -138,13 +139,15 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         {
             // A plane that holds most inliers may have led to the wrong one of its two poses.
             let twins = self.twins(&plane);
+            let mut least = self.cost(&refined);
             for twin in &twins {
-                let other = self.refine(&pose_model(&twin.pose, problem));
-                if self.cost(&other) < self.cost(&refined) {
-                    refined = other;
+                let other = self.refine(&pose_model(&twin.pose, problem), REFINE_PASSES);
+                let cost = self.cost(&other);
+                if cost < least {
+                    (refined, least) = (other, cost);
                 }
             }
-            self.mark(&refined, mask);
+            noise = self.mark(&refined, mask).1;
             let epipolar = refined.matrix();
             let evidence = Evidence { problem, inliers: mask, epipolar, sigma, accident };
             let explained = evidence.explained(&plane.0);
@@ -157,38 +160,39 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                 return self.planar(&plane, twins, sigma, mask);
             }
         }
-        self.general(&refined)
+        let (motion, noise) = self.motion(&refined, noise);
+        Judgement { verdict: RelativePoseVerdict::General(motion), noise }
     }
 
     /// The pose that all inliers support, with what lies just beyond the threshold at a falling weight.
-    pub(super) fn refine(&self, model: &PoseModel<T>) -> PoseModel<T> {
-        let loss = Loss::Tukey(self.support(model));
-        self.problem.optimise(model, &loss, 10, lit(1e-5)).model
+    pub(super) fn refine(&self, model: &PoseModel<T>, passes: u32) -> PoseModel<T> {
+        let loss = Loss::Tukey(self.support(self.noise(model)));
+        // The last step is worth a hundredth of a correspondence.
+        let tolerance = max(lit::<T>(1e-2) / from_u32(self.problem.data.count as u32), lit(1e-5));
+        self.problem.optimise(model, &loss, passes, tolerance).model
     }
 
     /// A pose refined from a caller's; none where too few agree with it to fix it. Writes the inlier mask.
     pub(super) fn refined(&self, pose: &Pose<T>, mask: &mut [bool]) -> Option<GeneralMotion<T>> {
         let mut start = pose_model(pose, self.problem);
         let length = sqrt(start.translation.norm_squared());
-        let refined = if length > T::ZERO {
+        let refined = (length > T::ZERO).then(|| {
             start.translation *= T::ONE / length;
-            Some(self.refine(&start))
-        } else {
-            None
-        };
-        let inliers = refined.map_or(0, |model| self.mark(&model, mask));
+            self.refine(&start, REFINE_PASSES)
+        });
+        let (inliers, noise) = refined.map_or((0, T::ZERO), |model| self.mark(&model, mask));
         if inliers < 6 {
             mask.iter_mut().for_each(|inlier| *inlier = false);
             return None;
         }
-        let motion = self.motion(&refined?).0;
+        let motion = self.motion(&refined?, noise).0;
         motion.covariance.map(|_| motion)
     }
 
-    /// A refined pose with its covariance, and the noise.
-    pub(super) fn motion(&self, model: &PoseModel<T>) -> (GeneralMotion<T>, T) {
-        let support = self.support(model);
-        let spread = self.spread(model, support);
+    /// A refined pose with its covariance, and the noise more precisely.
+    pub(super) fn motion(&self, model: &PoseModel<T>, noise: T) -> (GeneralMotion<T>, T) {
+        let support = self.support(noise);
+        let spread = self.sums(model, support).spread(support, 5);
         let loss = Loss::Truncated(support);
         let mut sums = normal_equations(self.problem.data, model, &loss);
         if let Some((known, _)) = &self.problem.prior {
@@ -197,33 +201,27 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         (GeneralMotion { pose: model.pose(), covariance: covariance(&sums, spread.variance) }, spread.noise)
     }
 
-    /// A refined pose as a verdict, and the noise.
-    fn general(&self, model: &PoseModel<T>) -> Judgement<T> {
-        let (motion, noise) = self.motion(model);
-        Judgement { verdict: RelativePoseVerdict::General(motion), noise }
-    }
-
     /// Where the loss about a pose ends: as far as the noise of these correspondences reaches.
-    fn support(&self, model: &PoseModel<T>) -> T {
-        let threshold = self.problem.threshold;
-        let [least, largest] = SUPPORT.map(|share| threshold * lit(share));
-        min(max(self.noise(model) * lit(SUPPORT_SIGMAS), least), largest)
+    fn support(&self, noise: T) -> T {
+        let [least, largest] = SUPPORT.map(|share| self.problem.threshold * lit(share));
+        min(max(noise * lit(SUPPORT_SIGMAS), least), largest)
     }
 
     /// The noise about a pose, from what lies within two thresholds.
-    fn noise(&self, model: &PoseModel<T>) -> T {
-        self.spread(model, self.problem.threshold * T::TWO).noise
+    pub(super) fn noise(&self, model: &PoseModel<T>) -> T {
+        let support = self.problem.threshold * T::TWO;
+        self.sums(model, support).spread(support, 5).noise
     }
 
-    /// The spread of the residuals about a pose under a loss that ends at `support`.
-    fn spread(&self, model: &PoseModel<T>, support: T) -> Spread<T> {
+    /// What the residuals about a pose say about the noise, by a loss that ends at `support`.
+    fn sums(&self, model: &PoseModel<T>, support: T) -> PsiSums<T> {
         let mut sums = PsiSums::default();
         let share = self.problem.threshold / support;
         let scale = share * share;
         self.problem.for_each_block(model, |_, squared, filled| {
             squared.iter().take(filled).for_each(|&s| sums.add(s * scale));
         });
-        sums.spread(support, 5)
+        sums
     }
 
     pub(super) fn cost(&self, model: &PoseModel<T>) -> T {
@@ -234,17 +232,18 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         score.map_or(T::MAX, |score| score.cost + prior)
     }
 
-    /// Writes the pose's inliers and counts them.
-    fn mark(&self, model: &PoseModel<T>, mask: &mut [bool]) -> u32 {
+    /// Writes the pose's inliers; how many they are, and the [`noise`](Self::noise).
+    fn mark(&self, model: &PoseModel<T>, mask: &mut [bool]) -> (u32, T) {
         let mut entries = mask.iter_mut();
-        let mut inliers = 0;
+        let (mut inliers, mut sums) = (0, PsiSums::default());
         self.problem.for_each_block(model, |_, squared, filled| {
             for (inlier, &s) in entries.by_ref().take(filled).zip(squared) {
                 *inlier = s < T::ONE;
                 inliers += *inlier as u32;
+                sums.add(s * lit(0.25));
             }
         });
-        inliers
+        (inliers, sums.spread(self.problem.threshold * T::TWO, 5).noise)
     }
 
     /// Writes the inliers of `x2 ~ H x1`.
