@@ -7,7 +7,7 @@ use crate::linalg::LANES;
 use crate::real::{from_u32, lit};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock};
 use crate::refine::homography::{HomographyModel, transfer_equations, transfer_sq};
-use crate::refine::lm::{Manifold, Minimum, descend};
+use crate::refine::lm::{Minimum, Tangents, descend};
 use crate::robust::loss::Loss;
 use crate::robust::{Estimator, Gate, Score, ScoreCounts, Tally};
 use crate::solvers::homography_4pt;
@@ -40,7 +40,7 @@ impl<T: Real, B: EpipolarBlock<T>> TransferProblem<'_, T, B> {
     }
 
     /// The model that minimises a loss, from `model`.
-    pub(super) fn optimise<M: Manifold<T, P>, const P: usize>(
+    pub(super) fn optimise<M: Tangents<T, P>, const P: usize>(
         &self,
         model: &M,
         loss: &Loss<T>,

@@ -74,8 +74,11 @@ pub(crate) trait EpipolarBlock<T: Real>: Block<T> {
     /// `(c, d)` of the Sampson error: `r^2 = c^2 / d`.
     fn residual(&self, f: &Matrix3<T>) -> (Lanes<T>, Lanes<T>);
 
-    /// `r` and its gradient by the entries of `f`, row by row.
-    fn gradient(&self, f: &Matrix3<T>) -> (Lanes<T>, [Lanes<T>; 9]);
+    /// `c`, `1 / d` and `sqrt(d)` times the gradient of `r` by the entries of `f`, row by row.
+    fn gradient(&self, f: &Matrix3<T>) -> (Lanes<T>, Lanes<T>, [Lanes<T>; 9]);
+
+    /// The epipolar geometry in a frame along the translation.
+    fn in_frame(&self, frame: &Frame<T>) -> InFrame<T>;
 
     /// The points on the plane z = 1, and by how much squared distances there are to be multiplied: 1 on a plane; for
     /// bearings what makes distances angles, NaN where a bearing does not meet the plane.
@@ -88,12 +91,50 @@ pub(crate) trait EpipolarBlock<T: Real>: Block<T> {
     fn directions(&self) -> ([Lanes<T>; 3], [Lanes<T>; 3]);
 }
 
+/// Two views as a frame sees them in which the translation is the third axis: then `c = y x x` has two terms only.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Frame<T: Real> {
+    /// From blocks' coordinates of view 1: `B' R D1^-1`.
+    pub(crate) view1: Matrix3<T>,
+    /// Of view 2, transposed: `D2^-1 B`.
+    pub(crate) view2: Matrix3<T>,
+}
+
+/// Correspondences in a [`Frame`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct InFrame<T> {
+    /// The point of view 1.
+    pub(crate) y: [Lanes<T>; 3],
+    /// The point of view 2.
+    pub(crate) x: [Lanes<T>; 3],
+    /// `c`.
+    pub(crate) c: Lanes<T>,
+    /// `1 / d`; zero where a point lies on both epipoles, which has no residual and no direction to move.
+    pub(crate) inverse: Lanes<T>,
+    /// `c / d` times the metric's product with the epipolar line of view 1, as a point of view 1.
+    pub(crate) z: [Lanes<T>; 3],
+    /// The same of view 2.
+    pub(crate) a: [Lanes<T>; 3],
+}
+
+impl<T: Real> InFrame<T> {
+    fn zero() -> Self {
+        let zero = [T::ZERO; LANES];
+        Self { y: [zero; 3], x: [zero; 3], c: zero, inverse: zero, z: [zero; 3], a: [zero; 3] }
+    }
+}
+
 /// Points of two image planes, in pixels of one common scale around the principal points: x1, y1, x2, y2.
 pub(crate) type PlaneBlock<T> = [Lanes<T>; 4];
 
 /// Bearings of two views with the metric of each, for lenses whose image is no plane: f1, f2, then `M = J J'` of
 /// view 1 and of view 2 as xx, xy, xz, yy, yz, zz.
 pub(crate) type BearingBlock<T> = [Lanes<T>; 18];
+
+#[inline(always)]
+fn inverse_or_zero<T: Real>(d: T) -> T {
+    if d > T::ZERO { T::ONE / d } else { T::ZERO }
+}
 
 impl<T: Real> EpipolarBlock<T> for PlaneBlock<T> {
     #[cfg_attr(not(small), inline(always))]
@@ -114,9 +155,9 @@ impl<T: Real> EpipolarBlock<T> for PlaneBlock<T> {
     }
 
     #[cfg_attr(not(small), inline(always))]
-    fn gradient(&self, f: &Matrix3<T>) -> (Lanes<T>, [Lanes<T>; 9]) {
+    fn gradient(&self, f: &Matrix3<T>) -> (Lanes<T>, Lanes<T>, [Lanes<T>; 9]) {
         let m = &f.data.0;
-        let mut r = [T::ZERO; LANES];
+        let (mut value, mut inverse) = ([T::ZERO; LANES], [T::ZERO; LANES]);
         let mut g = [[T::ZERO; LANES]; 9];
         for l in 0..LANES {
             let (x1, y1, x2, y2) = (self[0][l], self[1][l], self[2][l], self[3][l]);
@@ -127,25 +168,47 @@ impl<T: Real> EpipolarBlock<T> for PlaneBlock<T> {
             let q = m[1][0] * x2 + m[1][1] * y2 + m[1][2];
             let c = x2 * a + y2 * b + e;
             let d = (a * a + b * b) + (p * p + q * q);
-            // A point on both epipoles has no residual and no direction to move.
-            let inverse = if d > T::ZERO { T::ONE / crate::real::sqrt(d) } else { T::ZERO };
-            let residual = c * inverse;
-            let k = residual * inverse;
-            // dr = (x2 x1' - k (M2 l2 x1' + x2 (M1 l1)')) / sqrt(d)
-            let (u, v) = ((x2 - k * a) * inverse, (y2 - k * b) * inverse);
-            let (s, t) = (k * p * inverse, k * q * inverse);
-            r[l] = residual;
+            (value[l], inverse[l]) = (c, inverse_or_zero(d));
+            let k = c * inverse[l];
+            // sqrt(d) dr = x2 x1' - k (M2 l2 x1' + x2 (M1 l1)')
+            let (u, v) = (x2 - k * a, y2 - k * b);
+            let (s, t) = (k * p, k * q);
             g[0][l] = u * x1 - x2 * s;
             g[1][l] = u * y1 - x2 * t;
             g[2][l] = u;
             g[3][l] = v * x1 - y2 * s;
             g[4][l] = v * y1 - y2 * t;
             g[5][l] = v;
-            g[6][l] = x1 * inverse - s;
-            g[7][l] = y1 * inverse - t;
-            g[8][l] = inverse;
+            g[6][l] = x1 - s;
+            g[7][l] = y1 - t;
+            g[8][l] = T::ONE;
         }
-        (r, g)
+        (value, inverse, g)
+    }
+
+    #[cfg_attr(not(small), inline(always))]
+    fn in_frame(&self, frame: &Frame<T>) -> InFrame<T> {
+        let (m, n) = (&frame.view1.data.0, &frame.view2.data.0);
+        let mut all = InFrame::zero();
+        for l in 0..LANES {
+            let (x1, y1, x2, y2) = (self[0][l], self[1][l], self[2][l], self[3][l]);
+            let y = |i: usize| m[0][i] * x1 + m[1][i] * y1 + m[2][i];
+            let x = |i: usize| n[i][0] * x2 + n[i][1] * y2 + n[i][2];
+            let (y, x) = ([y(0), y(1), y(2)], [x(0), x(1), x(2)]);
+            let l1 = [m[0][0] * x[1] - m[0][1] * x[0], m[1][0] * x[1] - m[1][1] * x[0]];
+            let l2 = [n[1][0] * y[0] - n[0][0] * y[1], n[1][1] * y[0] - n[0][1] * y[1]];
+            let c = x[1] * y[0] - x[0] * y[1];
+            let inverse = inverse_or_zero((l2[0] * l2[0] + l2[1] * l2[1]) + (l1[0] * l1[0] + l1[1] * l1[1]));
+            let k = c * inverse;
+            let (s, t) = ([k * l1[0], k * l1[1]], [k * l2[0], k * l2[1]]);
+            for i in 0..3 {
+                (all.y[i][l], all.x[i][l]) = (y[i], x[i]);
+                all.z[i][l] = m[0][i] * s[0] + m[1][i] * s[1];
+                all.a[i][l] = n[i][0] * t[0] + n[i][1] * t[1];
+            }
+            (all.c[l], all.inverse[l]) = (c, inverse);
+        }
+        all
     }
 
     fn mispaired(&self, other: &Self) -> Self {
@@ -205,25 +268,53 @@ impl<T: Real> EpipolarBlock<T> for BearingBlock<T> {
     }
 
     #[cfg_attr(not(small), inline(always))]
-    fn gradient(&self, f: &Matrix3<T>) -> (Lanes<T>, [Lanes<T>; 9]) {
-        let mut r = [T::ZERO; LANES];
+    fn gradient(&self, f: &Matrix3<T>) -> (Lanes<T>, Lanes<T>, [Lanes<T>; 9]) {
+        let (mut value, mut inverse) = ([T::ZERO; LANES], [T::ZERO; LANES]);
         let mut g = [[T::ZERO; LANES]; 9];
         for l in 0..LANES {
             let (f1, f2, l1, l2) = lines(self, f, l);
             let (n1, n2) = metrics(self, l, &l1, &l2);
-            let c = dot(&f2, &l2);
-            let d = dot(&l2, &n2) + dot(&l1, &n1);
-            let inverse = if d > T::ZERO { T::ONE / crate::real::sqrt(d) } else { T::ZERO };
-            r[l] = c * inverse;
-            let k = r[l] * inverse;
+            value[l] = dot(&f2, &l2);
+            inverse[l] = inverse_or_zero(dot(&l2, &n2) + dot(&l1, &n1));
+            let k = value[l] * inverse[l];
             for i in 0..3 {
-                let u = (f2[i] - k * n2[i]) * inverse;
+                let u = f2[i] - k * n2[i];
                 for j in 0..3 {
-                    g[3 * i + j][l] = u * f1[j] - f2[i] * (k * n1[j] * inverse);
+                    g[3 * i + j][l] = u * f1[j] - f2[i] * (k * n1[j]);
                 }
             }
         }
-        (r, g)
+        (value, inverse, g)
+    }
+
+    #[cfg_attr(not(small), inline(always))]
+    fn in_frame(&self, frame: &Frame<T>) -> InFrame<T> {
+        let (m, n) = (&frame.view1.data.0, &frame.view2.data.0);
+        let mut all = InFrame::zero();
+        for l in 0..LANES {
+            let f1 = [self[0][l], self[1][l], self[2][l]];
+            let f2 = [self[3][l], self[4][l], self[5][l]];
+            let from1 = |v: &[T; 3]| {
+                let row = |i: usize| m[0][i] * v[0] + m[1][i] * v[1] + m[2][i] * v[2];
+                [row(0), row(1), row(2)]
+            };
+            let from2 = |v: &[T; 3]| [dot(&n[0], v), dot(&n[1], v), dot(&n[2], v)];
+            let (y, x) = (from1(&f1), from2(&f2));
+            let l1 = |j: usize| m[j][0] * x[1] - m[j][1] * x[0];
+            let l2 = |i: usize| n[1][i] * y[0] - n[0][i] * y[1];
+            let (l1, l2) = ([l1(0), l1(1), l1(2)], [l2(0), l2(1), l2(2)]);
+            let (n1, n2) = metrics(self, l, &l1, &l2);
+            let c = x[1] * y[0] - x[0] * y[1];
+            let inverse = inverse_or_zero(dot(&l2, &n2) + dot(&l1, &n1));
+            let k = c * inverse;
+            let (z, a) = (from1(&n1), from2(&n2));
+            for i in 0..3 {
+                (all.y[i][l], all.x[i][l]) = (y[i], x[i]);
+                (all.z[i][l], all.a[i][l]) = (k * z[i], k * a[i]);
+            }
+            (all.c[l], all.inverse[l]) = (c, inverse);
+        }
+        all
     }
 
     fn mispaired(&self, other: &Self) -> Self {

@@ -2,7 +2,8 @@
 
 use nalgebra::{Matrix3, SVector, Vector3};
 
-use super::lm::Manifold;
+use super::blocks::EpipolarBlock;
+use super::lm::{EpipolarModel, Manifold, Rows, rows_along};
 use crate::Real;
 use crate::geometry::pose::tangent_basis;
 use crate::linalg::least_singular3;
@@ -45,6 +46,17 @@ impl<T: Real> FundamentalModel<T> {
         })
     }
 
+    /// The derivatives of `F` by its parameters, row by row.
+    fn tangents(&self) -> [[T; 9]; 7] {
+        let mut result = [[T::ZERO; 9]; 7];
+        for (tangent, direction) in result.iter_mut().zip(self.directions(&self.bases())) {
+            for (row, entries) in direction.transpose().data.0.iter().zip(tangent.as_chunks_mut::<3>().0) {
+                *entries = *row;
+            }
+        }
+        result
+    }
+
     /// The derivatives of `F` by `G` (three directions orthogonal to it), `e1` and `e2`.
     fn directions(&self, [[c, d], [a, b]]: &[[Vector3<T>; 2]; 2]) -> [Matrix3<T>; 7] {
         let (fc, fd) = (self.matrix * c, self.matrix * d);
@@ -70,16 +82,6 @@ impl<T: Real> Manifold<T, 7> for FundamentalModel<T> {
         self.matrix
     }
 
-    fn tangents(&self) -> [[T; 9]; 7] {
-        let mut result = [[T::ZERO; 9]; 7];
-        for (tangent, direction) in result.iter_mut().zip(self.directions(&self.bases())) {
-            for (row, entries) in direction.transpose().data.0.iter().zip(tangent.as_chunks_mut::<3>().0) {
-                *entries = *row;
-            }
-        }
-        result
-    }
-
     fn retract(&self, step: &SVector<T, 7>) -> Self {
         let s = &step.data.0[0];
         let bases = self.bases();
@@ -93,6 +95,19 @@ impl<T: Real> Manifold<T, 7> for FundamentalModel<T> {
         let epipole2 = unit(self.epipole2 + a * s[5] + b * s[6]);
         // A step too large for any matrix to be left leaves the model where it is.
         Self::project(&moved, &epipole1, &epipole2).unwrap_or(*self)
+    }
+}
+
+impl<T: Real> EpipolarModel<T, 7> for FundamentalModel<T> {
+    type Frame = (Matrix3<T>, [[T; 9]; 7]);
+
+    fn frame(&self) -> Self::Frame {
+        (self.matrix, self.tangents())
+    }
+
+    #[cfg_attr(not(small), inline(always))]
+    fn rows<B: EpipolarBlock<T>>((matrix, tangents): &Self::Frame, block: &B) -> Rows<T, 7> {
+        rows_along(matrix, tangents, block)
     }
 }
 

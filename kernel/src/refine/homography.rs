@@ -6,7 +6,7 @@
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::blocks::{Block, BlockSlice, EpipolarBlock, PlaneBlock};
-use super::lm::{Manifold, NormalEquations};
+use super::lm::{Manifold, NormalEquations, Tangents};
 use super::relative_pose::{Scales, cayley};
 use crate::Real;
 use crate::linalg::{LANES, Lanes};
@@ -192,7 +192,7 @@ pub(crate) fn transfer_equations<T, B, M, const P: usize>(
 where
     T: Real,
     B: EpipolarBlock<T>,
-    M: Manifold<T, P>,
+    M: Tangents<T, P>,
 {
     let EntryEquations { products, slopes, cost, active } = entry_equations(data, &model.matrix(), loss);
     let tangents = model.tangents();
@@ -256,6 +256,21 @@ impl<T: Real> Manifold<T, 8> for HomographyModel<T> {
         self.0
     }
 
+    fn retract(&self, step: &SVector<T, 8>) -> Self {
+        let basis = self.tangents();
+        let mut h = self.0;
+        for i in 0..3 {
+            for j in 0..3 {
+                for p in 0..8 {
+                    h.data.0[j][i] += basis[p][3 * i + j] * step.data.0[0][p];
+                }
+            }
+        }
+        Self(h * (T::ONE / sqrt(h.norm_squared())))
+    }
+}
+
+impl<T: Real> Tangents<T, 8> for HomographyModel<T> {
     /// An orthonormal basis of the directions that change more than the scale: the columns, but the first, of the
     /// reflection that takes the first axis to -h or h.
     fn tangents(&self) -> [[T; 9]; 8] {
@@ -275,19 +290,6 @@ impl<T: Real> Manifold<T, 8> for HomographyModel<T> {
         }
         basis
     }
-
-    fn retract(&self, step: &SVector<T, 8>) -> Self {
-        let basis = self.tangents();
-        let mut h = self.0;
-        for i in 0..3 {
-            for j in 0..3 {
-                for p in 0..8 {
-                    h.data.0[j][i] += basis[p][3 * i + j] * step.data.0[0][p];
-                }
-            }
-        }
-        Self(h * (T::ONE / sqrt(h.norm_squared())))
-    }
 }
 
 /// A rotation between two views, as a homography of the blocks' coordinates.
@@ -302,6 +304,13 @@ impl<T: Real> Manifold<T, 3> for RotationModel<T> {
         self.scales.transfer(&self.rotation)
     }
 
+    fn retract(&self, step: &SVector<T, 3>) -> Self {
+        let w = Vector3::new(step.data.0[0][0], step.data.0[0][1], step.data.0[0][2]);
+        Self { rotation: cayley(&w) * self.rotation, scales: self.scales }
+    }
+}
+
+impl<T: Real> Tangents<T, 3> for RotationModel<T> {
     fn tangents(&self) -> [[T; 9]; 3] {
         let mut result = [[T::ZERO; 9]; 3];
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
@@ -319,11 +328,6 @@ impl<T: Real> Manifold<T, 3> for RotationModel<T> {
             }
         }
         result
-    }
-
-    fn retract(&self, step: &SVector<T, 3>) -> Self {
-        let w = Vector3::new(step.data.0[0][0], step.data.0[0][1], step.data.0[0][2]);
-        Self { rotation: cayley(&w) * self.rotation, scales: self.scales }
     }
 }
 

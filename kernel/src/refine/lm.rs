@@ -12,15 +12,41 @@ use crate::robust::loss::Loss;
 pub(crate) trait Manifold<T: Real, const P: usize>: Copy {
     /// The matrix of `x2' F x1`.
     fn matrix(&self) -> Matrix3<T>;
-    /// Its derivative by each local parameter, row by row.
+    /// The model moved by a step in the local parameters.
+    fn retract(&self, step: &SVector<T, P>) -> Self;
+}
+
+/// A model whose matrix is seen by its derivatives alone.
+pub(crate) trait Tangents<T: Real, const P: usize>: Manifold<T, P> {
+    /// The derivative of the matrix by each local parameter, row by row.
     fn tangents(&self) -> [[T; 9]; P];
+}
+
+/// A model with the Sampson error.
+pub(crate) trait EpipolarModel<T: Real, const P: usize>: Manifold<T, P> {
+    /// What is computed once a pass.
+    type Frame;
+    /// It.
+    fn frame(&self) -> Self::Frame;
+    /// The residuals of a block and their derivatives.
+    fn rows<B: EpipolarBlock<T>>(frame: &Self::Frame, block: &B) -> Rows<T, P>;
+    /// Sums by the parameters of the rows, as sums by those of the model.
+    fn turn_back(_frame: &Self::Frame, _sums: &mut NormalEquations<T, P>) {}
     /// Which correspondences of a block the model may explain at all (those in front of the cameras).
     #[cfg_attr(not(small), inline(always))]
     fn admits<B: EpipolarBlock<T>>(&self, _block: &B) -> [bool; LANES] {
         [true; LANES]
     }
-    /// The model moved by a step in the local parameters.
-    fn retract(&self, step: &SVector<T, P>) -> Self;
+}
+
+/// Residuals `r = c / sqrt(d)` of a block, without a root: only squares and products of them are summed.
+pub(crate) struct Rows<T, const P: usize> {
+    /// `c`.
+    pub(crate) c: Lanes<T>,
+    /// `1 / d`.
+    pub(crate) inverse: Lanes<T>,
+    /// `sqrt(d)` times the derivatives of `r`.
+    pub(crate) j: [Lanes<T>; P],
 }
 
 /// Sums of one pass: `J'WJ`, `J'Wr` and the cost.
@@ -60,38 +86,21 @@ struct Sums<T, const P: usize> {
 impl<T: Real, const P: usize> Sums<T, P> {
     /// Adds the lanes of a block of which the first `filled` count.
     #[cfg_attr(not(small), inline(always))]
-    fn add<B: EpipolarBlock<T>>(
-        &mut self,
-        block: &B,
-        f: &Matrix3<T>,
-        tangents: &[[T; 9]; P],
-        loss: &Loss<T>,
-        filled: usize,
-    ) {
-        let (r, g) = block.gradient(f);
+    fn add(&mut self, rows: &Rows<T, P>, loss: &Loss<T>, filled: usize) {
+        let Rows { c, inverse, j } = rows;
         let mut w = [T::ZERO; LANES];
         for l in 0..LANES {
             if l < filled {
-                let (cost, weight) = loss.evaluate(r[l] * r[l]);
+                let (cost, weight) = loss.evaluate(c[l] * c[l] * inverse[l]);
                 self.cost[l] += cost;
-                w[l] = weight;
-            }
-        }
-        let mut j = [[T::ZERO; LANES]; P];
-        for p in 0..P {
-            for l in 0..LANES {
-                let mut sum = g[0][l] * tangents[p][0];
-                for k in 1..9 {
-                    sum += g[k][l] * tangents[p][k];
-                }
-                j[p][l] = sum;
+                w[l] = weight * inverse[l];
             }
         }
         for p in 0..P {
             let mut weighted = [T::ZERO; LANES];
             for l in 0..LANES {
                 weighted[l] = w[l] * j[p][l];
-                self.gradient[p][l] += weighted[l] * r[l];
+                self.gradient[p][l] += weighted[l] * c[l];
             }
             for q in 0..P {
                 if q <= p {
@@ -102,6 +111,27 @@ impl<T: Real, const P: usize> Sums<T, P> {
             }
         }
     }
+}
+
+/// The rows of a model whose matrix moves along `tangents`.
+#[cfg_attr(not(small), inline(always))]
+pub(crate) fn rows_along<T: Real, B: EpipolarBlock<T>, const P: usize>(
+    f: &Matrix3<T>,
+    tangents: &[[T; 9]; P],
+    block: &B,
+) -> Rows<T, P> {
+    let (c, inverse, g) = block.gradient(f);
+    let mut j = [[T::ZERO; LANES]; P];
+    for p in 0..P {
+        for l in 0..LANES {
+            let mut sum = g[0][l] * tangents[p][0];
+            for k in 1..9 {
+                sum += g[k][l] * tangents[p][k];
+            }
+            j[p][l] = sum;
+        }
+    }
+    Rows { c, inverse, j }
 }
 
 #[cfg_attr(not(small), inline(always))]
@@ -118,7 +148,7 @@ pub(crate) fn normal_equations<T, B, M, const P: usize>(
 where
     T: Real,
     B: EpipolarBlock<T>,
-    M: Manifold<T, P>,
+    M: EpipolarModel<T, P>,
 {
     sampled_equations(data, 1, model, loss)
 }
@@ -135,11 +165,10 @@ pub(crate) fn sampled_equations<T, B, M, const P: usize>(
 where
     T: Real,
     B: EpipolarBlock<T>,
-    M: Manifold<T, P>,
+    M: EpipolarModel<T, P>,
 {
     let step = core::cmp::max(step, 1);
-    let f = model.matrix();
-    let tangents = model.tangents();
+    let (f, frame) = (model.matrix(), model.frame());
     let zero = [T::ZERO; LANES];
     let mut sums = Sums { hessian: [[zero; P]; P], gradient: [zero; P], cost: zero };
     let support = loss.support();
@@ -190,7 +219,7 @@ where
             }
         }
         if lanes > 0 {
-            sums.add(&current, &f, &tangents, loss, lanes);
+            sums.add(&M::rows(&frame, &current), loss, lanes);
         }
     }
     let mut hessian = SMatrix::<T, P, P>::zeros();
@@ -204,7 +233,9 @@ where
     }
     let outside = from_u32::<T>((seen as u32).saturating_sub(active));
     let beyond = support.map_or(T::ZERO, |limit| loss.evaluate(limit).0);
-    NormalEquations { hessian, gradient, cost: total(&sums.cost) + outside * beyond, active }
+    let mut sums = NormalEquations { hessian, gradient, cost: total(&sums.cost) + outside * beyond, active };
+    M::turn_back(&frame, &mut sums);
+    sums
 }
 
 /// How a minimisation ended.
@@ -230,7 +261,7 @@ pub(crate) fn minimise<T, B, M, const P: usize>(
 where
     T: Real,
     B: EpipolarBlock<T>,
-    M: Manifold<T, P>,
+    M: EpipolarModel<T, P>,
 {
     descend(start, P as u32, max_passes, tolerance, |model| normal_equations(data, model, loss), M::retract)
 }

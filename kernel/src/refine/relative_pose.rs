@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, SVector, Vector3};
 
-use super::blocks::{EpipolarBlock, in_front};
-use super::lm::Manifold;
+use super::blocks::{EpipolarBlock, Frame, InFrame, in_front};
+use super::lm::{EpipolarModel, Manifold, NormalEquations, Rows};
 use crate::Real;
 use crate::geometry::Pose;
 use crate::geometry::pose::{from_parts, tangent_basis};
@@ -130,48 +130,16 @@ fn cross<T: Real>(a: &[T; 3], b: &[T; 3]) -> [T; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+/// The axes of a frame along the translation, and the views in it.
+pub(crate) struct PoseFrame<T: Real> {
+    axes: Matrix3<T>,
+    views: Frame<T>,
+}
+
 impl<T: Real> Manifold<T, 5> for PoseModel<T> {
     #[inline]
     fn matrix(&self) -> Matrix3<T> {
         self.scales.apply(&self.essential())
-    }
-
-    fn tangents(&self) -> [[T; 9]; 5] {
-        let basis = tangent_basis(&self.translation);
-        let [u, v] = basis.data.0.map(Vector3::from);
-        let t = &self.translation.data.0[0];
-        let (s1, s2) = (self.scales.inverse1(), self.scales.inverse2());
-        let (s1, s2) = ([s1[0], s1[1], T::ONE], [s2[0], s2[1], T::ONE]);
-        let mut result = [[T::ZERO; 9]; 5];
-        for j in 0..3 {
-            let y = &self.rotation.data.0[j];
-            let ty = t[0] * y[0] + t[1] * y[1] + t[2] * y[2];
-            let along = [cross(&u.data.0[0], y), cross(&v.data.0[0], y)];
-            for i in 0..3 {
-                let s = s2[i] * s1[j];
-                for k in 0..3 {
-                    // t x (e_k x y) = e_k (t.y) - t_k y
-                    let own = if i == k { ty } else { T::ZERO };
-                    result[k][3 * i + j] = s * (own - t[k] * y[i]);
-                }
-                result[3][3 * i + j] = s * along[0][i];
-                result[4][3 * i + j] = s * along[1][i];
-            }
-        }
-        result
-    }
-
-    #[cfg_attr(not(small), inline(always))]
-    fn admits<B: EpipolarBlock<T>>(&self, block: &B) -> [bool; LANES] {
-        let (mut f1, mut f2) = block.directions();
-        let (s1, s2) = (self.scales.inverse1(), self.scales.inverse2());
-        for l in 0..LANES {
-            f1[0][l] *= s1[0];
-            f1[1][l] *= s1[1];
-            f2[0][l] *= s2[0];
-            f2[1][l] *= s2[1];
-        }
-        in_front(&f1, &f2, &self.rotation, &self.translation, self.scales.parallel_sq)
     }
 
     #[inline]
@@ -185,5 +153,71 @@ impl<T: Real> Manifold<T, 5> for PoseModel<T> {
             translation: t * (T::ONE / sqrt(t.norm_squared())),
             scales: self.scales,
         }
+    }
+}
+
+impl<T: Real> EpipolarModel<T, 5> for PoseModel<T> {
+    type Frame = PoseFrame<T>;
+
+    fn frame(&self) -> PoseFrame<T> {
+        let [u, v] = tangent_basis(&self.translation).data.0.map(Vector3::from);
+        let axes = Matrix3::from_columns(&[u, v, self.translation]);
+        let (s1, s2) = (self.scales.inverse1(), self.scales.inverse2());
+        let (mut view1, mut view2) = (axes.transpose() * self.rotation, axes);
+        for i in 0..3 {
+            for k in 0..2 {
+                view1.data.0[k][i] *= s1[k];
+                view2.data.0[i][k] *= s2[k];
+            }
+        }
+        PoseFrame { axes, views: Frame { view1, view2 } }
+    }
+
+    /// By a rotation of the frame, and by the translation along its first two axes:
+    /// `sqrt(d) dr = p (dE y) - x (dE z)` with `p = x - a`, where `dE y = e3 x (w x y)` or `e_k x y`.
+    #[cfg_attr(not(small), inline(always))]
+    fn rows<B: EpipolarBlock<T>>(frame: &PoseFrame<T>, block: &B) -> Rows<T, 5> {
+        let InFrame { y, x, c, inverse, z, a } = block.in_frame(&frame.views);
+        let mut j = [[T::ZERO; LANES]; 5];
+        for l in 0..LANES {
+            let p = [x[0][l] - a[0][l], x[1][l] - a[1][l], x[2][l] - a[2][l]];
+            j[0][l] = p[0] * y[2][l] - x[0][l] * z[2][l];
+            j[1][l] = p[1] * y[2][l] - x[1][l] * z[2][l];
+            j[2][l] = (x[0][l] * z[0][l] + x[1][l] * z[1][l]) - (p[0] * y[0][l] + p[1] * y[1][l]);
+            j[3][l] = (y[1][l] * p[2] - y[2][l] * p[1]) - (z[1][l] * x[2][l] - z[2][l] * x[1][l]);
+            j[4][l] = (y[2][l] * p[0] - y[0][l] * p[2]) - (z[2][l] * x[0][l] - z[0][l] * x[2][l]);
+        }
+        Rows { c, inverse, j }
+    }
+
+    fn turn_back(frame: &PoseFrame<T>, sums: &mut NormalEquations<T, 5>) {
+        let axes = &frame.axes.data.0;
+        let turn = |v: [T; 3]| {
+            let row = |i: usize| axes[0][i] * v[0] + axes[1][i] * v[1] + axes[2][i] * v[2];
+            [row(0), row(1), row(2)]
+        };
+        let columns = &mut sums.hessian.data.0;
+        for column in columns.iter_mut().chain(&mut sums.gradient.data.0) {
+            [column[0], column[1], column[2]] = turn([column[0], column[1], column[2]]);
+        }
+        for p in 0..5 {
+            let row = turn([columns[0][p], columns[1][p], columns[2][p]]);
+            for q in 0..3 {
+                columns[q][p] = row[q];
+            }
+        }
+    }
+
+    #[cfg_attr(not(small), inline(always))]
+    fn admits<B: EpipolarBlock<T>>(&self, block: &B) -> [bool; LANES] {
+        let (mut f1, mut f2) = block.directions();
+        let (s1, s2) = (self.scales.inverse1(), self.scales.inverse2());
+        for l in 0..LANES {
+            f1[0][l] *= s1[0];
+            f1[1][l] *= s1[1];
+            f2[0][l] *= s2[0];
+            f2[1][l] *= s2[1];
+        }
+        in_front(&f1, &f2, &self.rotation, &self.translation, self.scales.parallel_sq)
     }
 }

@@ -8,7 +8,7 @@ use crate::linalg::{LANES, Ldlt, Lu};
 use crate::real::{from_u32, max, min};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock, PlaneBlock};
 use crate::refine::homography::{HomographyModel, transfer_sq};
-use crate::refine::lm::{Manifold, NormalEquations};
+use crate::refine::lm::{NormalEquations, Tangents};
 
 /// The scatter of residuals under Tukey's biweight, as the asymptotic covariance of an M-estimate needs it.
 #[derive(Clone, Copy, Debug)]

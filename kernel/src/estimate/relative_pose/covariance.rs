@@ -7,7 +7,7 @@ use crate::geometry::pose::{skew, tangent_basis};
 use crate::linalg::Ldlt;
 use crate::real::{from_u32, lit, max, sqrt};
 use crate::refine::homography::HomographyModel;
-use crate::refine::lm::{Manifold, NormalEquations};
+use crate::refine::lm::{NormalEquations, Tangents};
 use crate::refine::relative_pose::Scales;
 
 /// `variance (J' J)^-1`; none where the equations are singular.

@@ -9,7 +9,9 @@ use crate::linalg::{LANES, Lanes, Ldlt};
 use crate::real::{abs, from_u32, lit, sqrt};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock};
 use crate::refine::homography::{RotationModel, transfer_sq};
-use crate::refine::lm::{Manifold, Minimum, NormalEquations, descend, normal_equations, sampled_equations};
+use crate::refine::lm::{
+    EpipolarModel, Manifold, Minimum, NormalEquations, descend, normal_equations, sampled_equations,
+};
 use crate::refine::relative_pose::{PoseModel, Scales};
 use crate::robust::loss::Loss;
 use crate::robust::{Estimator, Gate, Score, ScoreCounts, Tally};
