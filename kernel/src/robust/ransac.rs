@@ -6,7 +6,7 @@ use super::sampler::Sampler;
 use super::score::{Gate, Score};
 use super::stopping::{iterations_needed, miss_probability, undetected_inlier_ratio};
 use crate::Real;
-use crate::real::{from_u32, lit, max, min};
+use crate::real::{abs, from_u32, lit, max, min};
 
 /// How many locally optimised models a run keeps, best first.
 pub const KEPT: usize = 4;
@@ -18,6 +18,9 @@ const SLACK: f64 = 0.7;
 const PATIENCE: u32 = 5;
 /// Optima whose costs differ by less than this share of the correspondences count as the same one.
 const SAME_OPTIMUM: f64 = 0.003;
+
+/// Another optimum is a rival where what it explains less than the best is smaller than this share.
+const RIVAL: f64 = 0.05;
 
 /// What a run found: models after local optimisation, best first, and how it went.
 #[derive(Clone, Copy, Debug)]
@@ -156,7 +159,7 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
         }
         keep(&mut models, candidate);
         search.has_kept(&candidate.1, best.as_ref());
-        if leads && search.discoveries < E::DISCOVERIES {
+        if leads && search.discoveries < search.wanted() {
             if estimator.settles(&candidate.0, &mut search.refined_residuals) {
                 search.discoveries = E::DISCOVERIES;
             }
@@ -192,6 +195,8 @@ struct Search<'a, T> {
     /// Iterations for the best optimised model.
     needed: u32,
     discoveries: u32,
+    /// Whether another optimum came near the best.
+    rivalled: bool,
     gate: Gate<T>,
     /// What may be spent when another hypothesis is looked at, and whether more has been.
     last_start: u64,
@@ -226,6 +231,7 @@ impl<'a, T: Real> Search<'a, T> {
             minimal: Score { cost: T::MAX, inliers: 0 },
             needed: u32::MAX,
             discoveries: 0,
+            rivalled: false,
             last_start: options.budget.max_residuals.saturating_sub(one_score),
             exhausted: options.budget.max_residuals < one_score,
             stop: StopReason::MaxIterations,
@@ -238,11 +244,12 @@ impl<'a, T: Real> Search<'a, T> {
         sample: &mut [u32],
         keep_going: &mut Option<&mut dyn FnMut(&Progress) -> bool>,
     ) -> bool {
+        let wanted = self.wanted();
         let (spent, budget) = (&mut self.spent, &self.options.budget);
         if spent.iterations >= budget.max_iterations {
             return false;
         }
-        let patience = if self.discoveries < self.manners.discoveries { PATIENCE } else { 1 };
+        let patience = if self.discoveries < wanted { PATIENCE } else { 1 };
         if spent.iterations
             >= core::cmp::max(self.needed.saturating_mul(patience), self.options.min_iterations)
         {
@@ -297,13 +304,23 @@ impl<'a, T: Real> Search<'a, T> {
         !self.exhausted
     }
 
+    /// How many discoveries of the best optimum end a run.
+    fn wanted(&self) -> u32 {
+        if self.rivalled { self.manners.discoveries } else { self.manners.discoveries.div_ceil(2) }
+    }
+
     fn add_up(&mut self) {
         self.spent.residuals = self.counts.residuals + self.refined_residuals;
     }
 
     /// After another model has been kept beside the best one so far.
     fn has_kept(&mut self, score: &Score<T>, best: Option<&Score<T>>) {
-        let same = from_u32::<T>(self.count) * lit(SAME_OPTIMUM);
+        let all = from_u32::<T>(self.count);
+        let same = max(all * lit(SAME_OPTIMUM), T::ONE);
+        if let Some(best) = best {
+            let gap = abs(score.cost - best.cost);
+            self.rivalled |= gap > same && gap < (all - min(score.cost, best.cost)) * lit(RIVAL);
+        }
         self.discoveries = match best {
             Some(best) if score.cost > best.cost + same => self.discoveries,
             Some(best) if score.cost > best.cost - same => self.discoveries + 1,

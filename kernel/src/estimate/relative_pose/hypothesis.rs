@@ -323,31 +323,27 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
         let mut tally = Tally::new();
         let mut at = 0usize;
         let mut seen = 0u32;
-        // The last block may not be full; it is left to the full pass.
-        let full = self.data.count / LANES;
-        for _ in 0..full.div_ceil(CHUNK) {
-            for _ in 0..CHUNK {
-                if at < full
-                    && let Some(block) = blocks.get(at)
-                {
-                    tally.add(&self.squared(block, &view.matrix, view.scale));
-                    seen += LANES as u32;
-                }
-                at += self.stride;
-                if at >= blocks.len() {
-                    at -= blocks.len();
-                }
+        for k in 1..=blocks.len() {
+            if let Some(block) = blocks.get(at) {
+                let squared = self.squared_in_front(block, model, &view);
+                let filled = core::cmp::min(self.data.count.saturating_sub(at * LANES), LANES);
+                tally.add_first(&squared, filled);
+                seen += filled as u32;
             }
-            if gate.rejects(tally.cost(), tally.inliers(), from_u32(seen)) {
+            at += self.stride;
+            if at >= blocks.len() {
+                at -= blocks.len();
+            }
+            if (k % CHUNK == 0 || k == blocks.len())
+                && gate.rejects(tally.cost(), tally.inliers(), from_u32(seen))
+            {
                 counts.residuals += seen as u64;
                 counts.rejected_residuals += seen as u64;
                 counts.rejected_inliers += tally.inliers().to_u32() as u64;
                 return None;
             }
         }
-        counts.residuals += seen as u64 + self.data.count as u64;
-        let mut tally = Tally::new();
-        self.for_each_block(model, |_, squared, filled| tally.add_first(squared, filled));
+        counts.residuals += seen as u64;
         Some(tally.score())
     }
 
