@@ -304,9 +304,15 @@ impl<'a, T: Real> Search<'a, T> {
         !self.exhausted
     }
 
+    /// True where most of the correspondences agree with the best optimum: then few others can come near it.
+    fn most_agree(&self) -> bool {
+        self.spent.inliers > self.count / 2
+    }
+
     /// How many discoveries of the best optimum end a run.
     fn wanted(&self) -> u32 {
-        if self.rivalled { self.manners.discoveries } else { self.manners.discoveries.div_ceil(2) }
+        let clear = !self.rivalled && self.most_agree();
+        if clear { self.manners.discoveries.div_ceil(2) } else { self.manners.discoveries }
     }
 
     fn add_up(&mut self) {
@@ -316,7 +322,10 @@ impl<'a, T: Real> Search<'a, T> {
     /// After another model has been kept beside the best one so far.
     fn has_kept(&mut self, score: &Score<T>, best: Option<&Score<T>>) {
         let all = from_u32::<T>(self.count);
-        let same = max(all * lit(SAME_OPTIMUM), T::ONE);
+        let mut same = all * lit(SAME_OPTIMUM);
+        if self.most_agree() {
+            same = max(same, T::ONE);
+        }
         if let Some(best) = best {
             let gap = abs(score.cost - best.cost);
             self.rivalled |= gap > same && gap < (all - min(score.cost, best.cost)) * lit(RIVAL);
