@@ -182,8 +182,8 @@ impl<T: Real, B: EpipolarBlock<T>, K: Minimal<T, S>, const S: usize> Estimator<T
         if self.problem.within(data, model, wide) < support.to_u32() {
             return None;
         }
-        let model = self.problem.approach(data, model, wide, 1, self.support, residuals)?;
-        self.problem.approach(data, &model, wide * T::HALF, 1, 5, residuals)
+        let model = self.problem.approach(data, model, wide, (1, SUBSET), self.support, residuals)?;
+        self.problem.approach(data, &model, wide * T::HALF, (1, SUBSET), 5, residuals)
     }
 
     fn score(&self, model: &PoseModel<T>, gate: &Gate<T>, counts: &mut ScoreCounts) -> Option<Score<T>> {

@@ -47,6 +47,8 @@ const SUPPORT_SIGMAS: f64 = 6.0;
 const SUPPORT: [f64; 2] = [0.8, 2.6];
 /// Passes of the last refinement at the most.
 const REFINE_PASSES: u32 = 10;
+/// Passes of a twin's.
+const TWIN_PASSES: u32 = 4;
 /// A plane must explain so many in twenty of the pose's inliers to be the verdict; of a planar scene it explains all but
 /// accidents.
 const PLANE_SHARE_OF_20: u32 = 17;
@@ -141,10 +143,11 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
             let twins = self.twins(&plane);
             let mut least = self.cost(&refined);
             for twin in &twins {
-                let other = self.refine(&pose_model(&twin.pose, problem), REFINE_PASSES);
+                // Few passes tell whether it is better than the pose that it may lead back to.
+                let other = self.refine(&pose_model(&twin.pose, problem), TWIN_PASSES);
                 let cost = self.cost(&other);
                 if cost < least {
-                    (refined, least) = (other, cost);
+                    (refined, least) = (self.refine(&other, REFINE_PASSES), cost);
                 }
             }
             noise = self.mark(&refined, mask).1;
