@@ -350,9 +350,16 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
     }
 
     fn refine(&self, model: &PoseModel<T>, residuals: &mut u64) -> Option<PoseModel<T>> {
-        // A minimal model is off by more than the noise: inliers are gathered from three times the threshold first.
+        // A minimal model is off by more than the noise: inliers are gathered from three times the threshold first, on few
+        // correspondences where most of those agree.
         let wide = self.threshold * lit(WIDE);
-        let near = self.approach(self.data, model, wide, (WIDE_STEPS, WIDE_BLOCKS), 5, residuals)?;
+        let every = core::cmp::max(self.data.blocks.len().div_ceil(WIDE_BLOCKS), 1);
+        let most = core::cmp::max((self.data.count / (2 * every)) as u32, 5);
+        let few = self.approach(self.data, model, wide, (WIDE_STEPS, WIDE_BLOCKS), most, residuals);
+        let near = match few {
+            Some(near) => near,
+            None => self.approach(self.data, model, wide, (WIDE_STEPS, LOCAL_BLOCKS), 5, residuals)?,
+        };
         self.approach(self.data, &near, self.threshold, (LOCAL_STEPS, LOCAL_BLOCKS), 5, residuals)
     }
 

@@ -143,11 +143,14 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
             let twins = self.twins(&plane);
             let mut least = self.cost(&refined);
             for twin in &twins {
-                // Few passes tell whether it is better than the pose that it may lead back to.
-                let other = self.refine(&pose_model(&twin.pose, problem), TWIN_PASSES);
-                let cost = self.cost(&other);
-                if cost < least {
-                    (refined, least) = (self.refine(&other, REFINE_PASSES), cost);
+                // Few passes tell whether it comes near the pose.
+                let near = self.refine(&pose_model(&twin.pose, problem), TWIN_PASSES);
+                if self.cost(&near) < least + T::ONE {
+                    let other = self.refine(&near, REFINE_PASSES);
+                    let cost = self.cost(&other);
+                    if cost < least {
+                        (refined, least) = (other, cost);
+                    }
                 }
             }
             noise = self.mark(&refined, mask).1;
