@@ -182,8 +182,8 @@ impl<T: Real, B: EpipolarBlock<T>, K: Minimal<T, S>, const S: usize> Estimator<T
         if self.problem.within(data, model, wide) < support.to_u32() {
             return None;
         }
-        let model = self.problem.approach(data, model, wide, (1, SUBSET), self.support, residuals)?;
-        self.problem.approach(data, &model, wide * T::HALF, (1, SUBSET), 5, residuals)
+        let model = self.problem.approach(data, model, wide, 1, self.support, residuals)?;
+        self.problem.approach(data, &model, wide * T::HALF, 1, 5, residuals)
     }
 
     fn score(&self, model: &PoseModel<T>, gate: &Gate<T>, counts: &mut ScoreCounts) -> Option<Score<T>> {
@@ -199,7 +199,9 @@ impl<T: Real, B: EpipolarBlock<T>, K: Minimal<T, S>, const S: usize> Estimator<T
     }
 }
 
-/// The consensus by smaller samples; none where the prior is too vague for them.
+/// The consensus by smaller samples; none where the prior is too vague for them. Not inlined: its variables take no stack
+/// during the verdict.
+#[inline(never)]
 fn search<T: Real, B: EpipolarBlock<T>>(
     problem: &PoseProblem<'_, T, B>,
     known: &KnownRotation<T>,

@@ -37,16 +37,14 @@ pub(super) struct PoseProblem<'a, T: Real, B> {
 
 /// Blocks scored between two looks at the gate.
 const CHUNK: usize = 2;
-/// Steps of the two stages of a local optimisation, and the blocks that they look at.
+/// Steps of the two stages of a local optimisation.
 const WIDE_STEPS: u32 = 2;
-const WIDE_BLOCKS: usize = 16;
 const LOCAL_STEPS: u32 = 3;
-const LOCAL_BLOCKS: usize = 64;
 /// The first stage's threshold over the second's.
 const WIDE: f64 = 3.0;
 /// A stage ends with a step that promises less than this share of the cost.
 const CONVERGED: f64 = 0.01;
-/// Blocks on which accidents are counted and the final rotation is looked for.
+/// Blocks that a local optimisation looks at.
 pub(super) const SAMPLED_BLOCKS: usize = 64;
 /// Blocks on which it is tried whether a pose is but a rotation.
 const TURNED_BLOCKS: usize = 16;
@@ -185,7 +183,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         blocks: usize,
         mut each: impl FnMut(&B, &[bool; LANES]),
     ) -> (u32, u32) {
-        let every = core::cmp::max(self.data.blocks.len().div_ceil(core::cmp::max(blocks, 1)), 1);
+        let every = core::cmp::max(self.data.blocks.len().div_ceil(SAMPLED_BLOCKS), 1);
         let (view, h) = (self.view(pose), rotation.matrix());
         let (mut inliers, mut turned) = (0u32, 0u32);
         let mut left = self.data.count;
@@ -231,18 +229,18 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         count
     }
 
-    /// At most `steps` Gauss-Newton steps towards the minimum of the errors truncated at `threshold`, on so many of the
-    /// blocks, without a look at where the last one leads; none where fewer than `least` are active or a direction is open.
+    /// At most `steps` Gauss-Newton steps towards the minimum of the errors truncated at `threshold`, on some of the blocks,
+    /// without a look at where the last one leads; none where fewer than `least` are active or a direction is open.
     pub(super) fn approach(
         &self,
         data: BlockSlice<'_, B>,
         model: &PoseModel<T>,
         threshold: T,
-        (steps, blocks): (u32, usize),
+        steps: u32,
         least: u32,
         residuals: &mut u64,
     ) -> Option<PoseModel<T>> {
-        let every = data.blocks.len().div_ceil(core::cmp::max(blocks, 1));
+        let every = data.blocks.len().div_ceil(SAMPLED_BLOCKS);
         let mut model = *model;
         for _ in 0..steps {
             let mut sums = sampled_equations(data, every, &model, &Loss::Truncated(threshold));
@@ -350,17 +348,10 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
     }
 
     fn refine(&self, model: &PoseModel<T>, residuals: &mut u64) -> Option<PoseModel<T>> {
-        // A minimal model is off by more than the noise: inliers are gathered from three times the threshold first, on few
-        // correspondences where most of those agree.
+        // A minimal model is off by more than the noise: inliers are gathered from three times the threshold first.
         let wide = self.threshold * lit(WIDE);
-        let every = core::cmp::max(self.data.blocks.len().div_ceil(WIDE_BLOCKS), 1);
-        let most = core::cmp::max((self.data.count / (2 * every)) as u32, 5);
-        let few = self.approach(self.data, model, wide, (WIDE_STEPS, WIDE_BLOCKS), most, residuals);
-        let near = match few {
-            Some(near) => near,
-            None => self.approach(self.data, model, wide, (WIDE_STEPS, LOCAL_BLOCKS), 5, residuals)?,
-        };
-        self.approach(self.data, &near, self.threshold, (LOCAL_STEPS, LOCAL_BLOCKS), 5, residuals)
+        let near = self.approach(self.data, model, wide, WIDE_STEPS, 5, residuals)?;
+        self.approach(self.data, &near, self.threshold, LOCAL_STEPS, 5, residuals)
     }
 
     fn settles(&self, model: &PoseModel<T>, residuals: &mut u64) -> bool {
