@@ -148,7 +148,7 @@ impl<T: Real, B: EpipolarBlock<T>, K: Minimal<T, S>, const S: usize> Estimator<T
     // A polished model lies where its optimum does.
     const NEAR_MISSES: u32 = 2;
     // The subset is looked at three times before.
-    const SCORE_PASSES: u32 = 5;
+    const SCORE_PASSES: u32 = 4;
 
     fn count(&self) -> u32 {
         self.problem.data.count as u32

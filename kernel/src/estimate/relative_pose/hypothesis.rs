@@ -183,7 +183,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         blocks: usize,
         mut each: impl FnMut(&B, &[bool; LANES]),
     ) -> (u32, u32) {
-        let every = core::cmp::max(self.data.blocks.len().div_ceil(SAMPLED_BLOCKS), 1);
+        let every = core::cmp::max(self.data.blocks.len().div_ceil(core::cmp::max(blocks, 1)), 1);
         let (view, h) = (self.view(pose), rotation.matrix());
         let (mut inliers, mut turned) = (0u32, 0u32);
         let mut left = self.data.count;
@@ -293,6 +293,7 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
 
     const DISCOVERIES: u32 = 3;
     const NEAR_MISS_INTERVAL: u32 = 8;
+    const SCORE_PASSES: u32 = 1;
 
     fn count(&self) -> u32 {
         self.data.count as u32
@@ -327,7 +328,11 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
             if let Some(block) = blocks.get(at) {
                 let squared = self.squared_in_front(block, model, &view);
                 let filled = core::cmp::min(self.data.count.saturating_sub(at * LANES), LANES);
-                tally.add_first(&squared, filled);
+                if filled == LANES {
+                    tally.add(&squared);
+                } else {
+                    tally.add_first(&squared, filled);
+                }
                 seen += filled as u32;
             }
             at += self.stride;

@@ -115,9 +115,9 @@ pub type RelativePoseError = TwoViewError;
 ///
 /// # Cost
 /// At most `max_iterations` samples, by itself as many as the confidence needs for the inliers found; beyond a budget of
-/// residuals at most one refinement (five passes over 256 correspondences at the most, one score, which is two passes over
-/// all, and seven over 64 to try a rotation),
-/// and the verdict's passes. A budget of fewer than 2 n residuals, of 4 n with a prior, scores nothing. At half outliers a prior takes
+/// residuals at most one refinement (five passes over 256 correspondences at the most, one score of all, and seven passes
+/// over 64 to try a rotation),
+/// and the verdict's passes. A budget of fewer than n residuals, of 4 n with a prior, scores nothing. At half outliers a prior takes
 /// less than a third of the samples and of the time; a contradicted one costs its own search, of as many samples as a
 /// fifth of inliers needs, and one more verdict.
 ///
