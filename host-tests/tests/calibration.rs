@@ -1,11 +1,7 @@
 //! Covariances against Monte Carlo: the normalised squared error of an estimate has as its mean the number of its degrees
-//! of freedom. 250 trials a row, or as many as `EPIPOLE_TRIALS` says. General poses and rotations without outliers must
-//! lie within the two-sided 95 % bounds of that number of trials; every other row within 0.85 and 1.15 of the freedom,
-//! where poses that outliers led astray (beyond six times the freedom, at most 2 in 100) are counted and not averaged.
-//!
-//! 1,000 trials with nothing set aside measured, over the freedom: without outliers general poses 1.00, rotations 1.00 to
-//! 1.01; among 20 % outliers general poses 1.06 to 1.08; planes 1.04 to 1.05 and homographies 1.05 to 1.07 with and
-//! without. What is above 1.044 to 1.056 is beyond its 95 %: these covariances are a little too small, and why is open.
+//! of freedom. 1,000 trials a row, or as many as `EPIPOLE_TRIALS` says: every row must lie within the two-sided 95 % bounds
+//! of that number of trials. Poses that outliers led astray (beyond six times the freedom, at most 2 in 100) are counted
+//! and not averaged.
 
 use epipole::estimate::{
     GeneralMotion, HomographyOptions, HomographyVerdict, PlanarPose, RelativePoseOptions,
@@ -20,8 +16,10 @@ use epipole_host_tests::{Rng, for_each_case};
 
 const SIGMA: f64 = 0.5;
 
-fn trials() -> u64 {
-    std::env::var("EPIPOLE_TRIALS").ok().map_or(250, |text| text.parse().expect("EPIPOLE_TRIALS is a number"))
+fn trials(usual: u64) -> u64 {
+    std::env::var("EPIPOLE_TRIALS")
+        .ok()
+        .map_or(usual, |text| text.parse().expect("EPIPOLE_TRIALS is a number"))
 }
 
 /// `e' C^-1 e`.
@@ -105,10 +103,6 @@ fn heavy(problem: &mut TwoView, rng: &mut Rng) {
     }
 }
 
-fn motion_is_free(name: &str) -> bool {
-    name == "general" || name == "rotation"
-}
-
 type Measure = fn(&TwoView, f64) -> Option<f64>;
 const KINDS: [(&str, Motion, Shape, f64, Measure); 4] = [
     ("general", Motion::General, Shape::Volume, 5.0, general),
@@ -124,7 +118,7 @@ fn normalised_errors_are_what_the_covariances_say() {
         for (deviations, outliers) in [(3.0, 0.0), (2.0, 0.0), (3.0, 0.2), (2.0, 0.2)] {
             let (mut sum, mut count, mut refused, mut wild) = (0.0, 0.0, 0, 0.0);
             let scene = Scene::new(motion, 100).shape(shape).noise_px(SIGMA).outliers(outliers);
-            for_each_case(trials(), |seed, _| {
+            for_each_case(trials(1_000), |seed, _| {
                 match measure(&scene.generate(seed + 40_000), deviations * SIGMA) {
                     // Led astray by outliers: counted, not averaged.
                     Some(squared) if outliers > 0.0 && squared > 6.0 * freedom => wild += 1.0,
@@ -139,10 +133,7 @@ fn normalised_errors_are_what_the_covariances_say() {
                 "{name:10} at {deviations} sigma, outliers {outliers}: {mean:.3} of {freedom}, z {z:+.2}, {} 95 %, refused {refused}, astray {wild}",
                 if z.abs() < 1.96 { "within" } else { "beyond" }
             );
-            let strict = outliers == 0.0 && motion_is_free(name);
-            if wild > 0.02 * count
-                || !((0.85..1.15).contains(&(mean / freedom)) && (!strict || z.abs() < 1.96))
-            {
+            if wild > 0.02 * count || !(z.abs() < 1.96) {
                 wrong.push((name, deviations, outliers, mean));
             }
         }
@@ -158,7 +149,7 @@ fn heavy_tails_leave_a_factor() {
         for deviations in [3.0, 2.0] {
             let (mut values, mut refused) = (Vec::new(), 0);
             let scene = Scene::new(motion, 100).shape(shape);
-            for_each_case(trials(), |seed, rng| {
+            for_each_case(trials(250), |seed, rng| {
                 let mut problem = scene.generate(seed + 40_000);
                 heavy(&mut problem, rng);
                 match measure(&problem, deviations * SIGMA) {

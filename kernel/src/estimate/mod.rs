@@ -20,6 +20,7 @@ mod homography;
 mod load;
 mod prior;
 mod relative_pose;
+mod scatter;
 mod transfer;
 mod workspace;
 

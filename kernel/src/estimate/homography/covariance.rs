@@ -3,68 +3,13 @@
 use nalgebra::{SMatrix, Vector2};
 
 use super::super::frame::PixelFrame;
+use super::super::scatter::Scatter;
 use crate::Real;
 use crate::linalg::{LANES, Ldlt, Lu};
-use crate::real::{from_u32, max, min};
-use crate::refine::blocks::{BlockSlice, EpipolarBlock, PlaneBlock};
-use crate::refine::homography::{HomographyModel, transfer_sq};
+use crate::real::{max, min};
+use crate::refine::blocks::{BlockSlice, PlaneBlock};
+use crate::refine::homography::HomographyModel;
 use crate::refine::lm::{NormalEquations, Tangents};
-
-/// The scatter of residuals under Tukey's biweight, as the asymptotic covariance of an M-estimate needs it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Scatter<T> {
-    /// Sum of the weights.
-    weights: T,
-    /// Sum over both coordinates of the squared weighted residuals, halved.
-    squares: T,
-    /// Sum of the mean derivative of a weighted residual by its residual.
-    slopes: T,
-    /// How many correspondences lie within the support.
-    count: u32,
-}
-
-impl<T: Real> Scatter<T> {
-    /// The scatter about a model; `support` is where the biweight vanishes.
-    pub(super) fn new(data: BlockSlice<'_, PlaneBlock<T>>, model: &HomographyModel<T>, support: T) -> Self {
-        let inverse = T::ONE / (support * support);
-        let three = T::TWO + T::ONE;
-        let mut result = Self { weights: T::ZERO, squares: T::ZERO, slopes: T::ZERO, count: 0 };
-        let mut left = data.count;
-        for block in data.blocks {
-            let (plane, weight) = block.planes();
-            for (l, squared) in transfer_sq(&model.0, &plane, &weight).into_iter().enumerate().take(LANES) {
-                let u = squared * inverse;
-                if l < left && u < T::ONE {
-                    let v = T::ONE - u;
-                    let weight = v * v;
-                    result.weights += weight;
-                    result.squares += weight * weight * squared * T::HALF;
-                    result.slopes += v * (T::ONE - three * u);
-                    result.count += 1;
-                }
-            }
-            left = left.saturating_sub(LANES);
-        }
-        result
-    }
-
-    /// By how much the inverse of `J' W J` is to be multiplied: `E[psi psi'] E[psi']^-2` of the residuals, times the mean weight.
-    fn factor(&self) -> Option<T> {
-        (self.slopes > T::ZERO)
-            .then(|| self.fitted() * self.squares * self.weights / (self.slopes * self.slopes))
-    }
-
-    /// By how much two residuals a correspondence are too small about a model of eight parameters fitted to them.
-    fn fitted(&self) -> T {
-        let n = core::cmp::max(self.count, 5);
-        from_u32::<T>(n) / from_u32::<T>(n - 4)
-    }
-
-    /// Variance of one coordinate's noise.
-    pub(super) fn variance(&self) -> T {
-        if self.slopes > T::ZERO { self.fitted() * self.squares / self.slopes } else { T::ZERO }
-    }
-}
 
 /// The corners of the box around the inliers in view 1, drawn towards its points' mean until the plane's horizon is far.
 pub(super) fn corners<T: Real>(

@@ -8,6 +8,7 @@ use super::error::TwoViewError;
 use super::frame::PixelFrame;
 use super::load::check_pixels;
 use super::relative_pose::Unobservable;
+use super::scatter::Scatter;
 use super::transfer::TransferProblem;
 use super::workspace::{TwoViewStorage, TwoViewWorkspace};
 use crate::Real;
@@ -22,7 +23,7 @@ use crate::robust::{Guide, RansacOptions, rank_by_score, ransac};
 mod covariance;
 mod verdict;
 
-use covariance::{Scatter, corners, covariance, to_pixels};
+use covariance::{corners, covariance, to_pixels};
 pub use verdict::{FoundHomography, HomographyEstimate, HomographyVerdict};
 
 /// Malformed input or options of [`homography`].

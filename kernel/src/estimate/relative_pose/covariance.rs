@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
+use super::super::scatter::student;
 use crate::Real;
 use crate::geometry::pose::{skew, tangent_basis};
 use crate::linalg::Ldlt;
@@ -78,7 +79,11 @@ impl<T: Real> PsiSums<T> {
         let correction = T::ONE + from_u32::<T>(freedom) / n * spread;
         Spread {
             noise: sqrt(self.r_psi / slope * scale),
-            variance: self.psi_sq * n / (slope * slope) * scale * correction * correction,
+            variance: self.psi_sq * n / (slope * slope)
+                * scale
+                * correction
+                * correction
+                * student(self.count.saturating_sub(freedom)),
         }
     }
 }

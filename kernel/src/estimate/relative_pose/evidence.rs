@@ -12,7 +12,8 @@
 //! is, and the one along them must not be larger: the logarithm of the ratio of both has a known deviation.
 //!
 //! By fit: on what a plane explains, the epipolar lines of the pose must not fit far better than those of the plane's
-//! own motion, a likelihood ratio with five degrees of freedom.
+//! own motion: by a likelihood ratio with five degrees of freedom, which holds for lines close by, and by Vuong's with
+//! the scatter of Gaussian errors, which holds for lines of another direction.
 //!
 //! # References
 //! L. Moisan, B. Stival, "A probabilistic criterion to detect rigid point matches between two images", IJCV 2004 (the
@@ -21,6 +22,8 @@
 //! correspondences decide).
 //! P. Torr, "An assessment of information criteria for motion model selection", CVPR 1997 (the models and their
 //! degrees of freedom).
+//! Q. Vuong, "Likelihood ratio tests for model selection and non-nested hypotheses", Econometrica 1989 (the scatter of a
+//! likelihood ratio).
 
 use nalgebra::Matrix3;
 
@@ -35,6 +38,8 @@ use super::hypothesis::PoseProblem;
 
 /// Chi-squared of five degrees of freedom exceeds this once in 5,000 times.
 const CHANCE_GAIN: f64 = 24.0;
+/// A Gaussian variable lies so many standard deviations above its mean once in 5,000 times.
+const CHANCE_DEVIATIONS: f64 = 3.54;
 
 /// How a simpler model explains the inliers of a pose.
 #[derive(Clone, Copy, Debug)]
@@ -56,7 +61,7 @@ pub(super) struct Evidence<'a, 'b, T: Real, B> {
     pub(super) problem: &'a PoseProblem<'b, T, B>,
     /// Which correspondences are inliers of the pose.
     pub(super) inliers: &'a [bool],
-    /// The pose's matrix in the blocks' coordinates.
+    /// The matrix of the epipolar lines in the blocks' coordinates: the pose's, or the simpler model's own.
     pub(super) epipolar: Matrix3<T>,
     /// Standard deviation of a coordinate in the blocks' unit.
     pub(super) sigma: T,
@@ -114,24 +119,38 @@ impl<T: Real, B: EpipolarBlock<T>> Evidence<'_, '_, T, B> {
         beyond_chance_with(unexplained, explained.others, 2, self.accident, deviations, accidents)
     }
 
-    /// True where the pose's epipolar lines fit what `x2 ~ H x1` explains far better than those of the plane's own pose
-    /// `twin` do: the pose has five parameters to fit noise with, the twin follows from the plane.
-    pub(super) fn bends(&self, h: &Matrix3<T>, twin: &Matrix3<T>, noise: T) -> bool {
+    /// True where the epipolar lines of `pose` fit what the plane `x2 ~ H x1` explains far better than the plane's own
+    /// lines, those of this evidence, do: by more than five parameters fitted to noise gain, and by more than lines of
+    /// another direction gain, across which the noise is another.
+    pub(super) fn bends(&self, h: &Matrix3<T>, pose: &Matrix3<T>, noise: T) -> bool {
         let limit: T = lit(EXPLAINED_SIGMAS * EXPLAINED_SIGMAS);
         let scale = T::ONE / (self.sigma * self.sigma);
         let mut gain = T::ZERO;
+        // Of both errors of a correspondence: squares and product, and their number.
+        let (mut cc, mut ee, mut ce, mut n) = (T::ZERO, T::ZERO, T::ZERO, T::ZERO);
         let mut mask = self.inliers.iter();
         for block in self.problem.data.blocks {
             let (plane, mut weight) = block.planes();
             weight.iter_mut().for_each(|w| *w *= scale);
             let squared = transfer_sq(h, &plane, &weight);
-            let ((c, d), (e, f)) = (block.residual(twin), block.residual(&self.epipolar));
+            let ((c, d), (e, f)) = (block.residual(&self.epipolar), block.residual(pose));
             for (l, _) in (0..LANES).zip(mask.by_ref()) {
                 if squared[l] < limit {
-                    gain += min(c[l] * c[l] * scale / d[l], limit) - min(e[l] * e[l] * scale / f[l], limit);
+                    let (own, other) = (c[l] * c[l] * scale / d[l], e[l] * e[l] * scale / f[l]);
+                    gain += min(own, limit) - min(other, limit);
+                    if own < limit && other < limit {
+                        cc += own;
+                        ee += other;
+                        ce += c[l] * e[l] * scale / sqrt(d[l] * f[l]);
+                        n += T::ONE;
+                    }
                 }
             }
         }
-        gain * self.sigma * self.sigma > lit::<T>(CHANCE_GAIN) * noise * noise
+        // Two Gaussian variables of correlation r: the difference of their squares has the variance 4 (1 - r^2).
+        let apart = T::ONE - ce * ce / max(cc * ee, T::MIN_POSITIVE);
+        let deviations: T = lit(CHANCE_DEVIATIONS * CHANCE_DEVIATIONS * 4.0);
+        let unit = noise * noise * scale;
+        gain > unit * lit(CHANCE_GAIN) && gain * gain > unit * unit * deviations * n * apart
     }
 }

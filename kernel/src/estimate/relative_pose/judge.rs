@@ -154,16 +154,17 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                 }
             }
             noise = self.mark(&refined, mask).1;
-            let epipolar = refined.matrix();
-            let evidence = Evidence { problem, inliers: mask, epipolar, sigma, accident };
-            let explained = evidence.explained(&plane.0);
-            let share = explained.inliers * 20 >= (explained.inliers + explained.others) * PLANE_SHARE_OF_20;
-            let plane_stands = twins.first().is_some_and(|twin| {
-                let twin = pose_model(&twin.pose, problem).matrix();
-                !evidence.bends(&plane.0, &twin, max(noise, sigma * T::HALF))
-            });
-            if share && plane_stands && !evidence.proves_parallax(count, &explained, 8, lit(ACCIDENTS)) {
-                return self.planar(&plane, twins, sigma, mask);
+            if let Some(twin) = twins.first() {
+                // The plane's own lines: those of the pose are the ones that the noise happens to lie along.
+                let epipolar = pose_model(&twin.pose, problem).matrix();
+                let evidence = Evidence { problem, inliers: mask, epipolar, sigma, accident };
+                let explained = evidence.explained(&plane.0);
+                let share =
+                    explained.inliers * 20 >= (explained.inliers + explained.others) * PLANE_SHARE_OF_20;
+                let bends = evidence.bends(&plane.0, &refined.matrix(), max(noise, sigma * T::HALF));
+                if share && !bends && !evidence.proves_parallax(count, &explained, 8, lit(ACCIDENTS)) {
+                    return self.planar(&plane, twins, sigma, mask);
+                }
             }
         }
         let (motion, noise) = self.motion(&refined, noise);

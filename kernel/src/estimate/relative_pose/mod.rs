@@ -84,8 +84,9 @@ pub type RelativePoseError = TwoViewError;
 /// simplest of no motion, a rotation, a plane and a general motion that the data leave standing is the verdict: a
 /// simpler model falls where correspondences that it does not explain agree with the pose more often than chance (at most
 /// 0.01 accidents expected, 0.0001 against a rotation; the chance is measured on mispaired correspondences), or where the
-/// errors along the epipolar lines are larger than those across. A model explains what lies within 5 sigma, where sigma is
-/// the larger of the option's and of the one that the residuals show.
+/// errors along the epipolar lines (of a plane: its own) are larger than those across; a plane also where the pose's lines
+/// fit far better than its own. A model explains what lies within 5 sigma, where sigma is the larger of the option's and of
+/// the one that the residuals show.
 ///
 /// With a [`RelativePosePrior`] the hypotheses come from three correspondences and the vertical, or from two and the
 /// rotation; each is polished on a few correspondences within a threshold as wide as the prior's uncertainty, and the
@@ -111,7 +112,8 @@ pub type RelativePoseError = TwoViewError;
 ///
 /// # Accuracy
 /// That of a maximum-likelihood fit to the inliers (Tukey's loss, ending at six standard deviations of the noise found, 0.8
-/// to 2.6 thresholds), in `f32` as in `f64`.
+/// to 2.6 thresholds), in `f32` as in `f64`. The covariances are those of M-estimates with the noise found: over 1,000
+/// scenes of 100 points, with no and with 20 % outliers, the mean normalised squared errors lie within their 95 % bounds.
 ///
 /// # Cost
 /// At most `max_iterations` samples, by itself as many as the confidence needs for the inliers found; beyond a budget of

@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::super::chance::EXPLAINED_SIGMAS;
-use super::covariance::{planar_covariance, variance};
+use super::super::scatter::Scatter;
+use super::covariance::planar_covariance;
 use super::judge::{Judge, Judgement, pose_model};
 use super::verdict::{PlanarPose, RelativePoseVerdict};
 use crate::geometry::{Homography, Pose};
@@ -16,8 +16,10 @@ use crate::robust::Sampler;
 use crate::robust::loss::Loss;
 use crate::{Real, Solutions};
 
-/// A plane is looked for with the threshold of this many standard deviations.
+/// A plane is looked for with the threshold of this many standard deviations, and refined with a loss that ends at twice as
+/// many; passes over the data of the refinement at the most.
 const PLANE_SIGMAS: f64 = 3.5;
+const PLANE_PASSES: u32 = 12;
 
 /// Inliers among which a plane is looked for, and planes through three of them that are tried: of a plane that holds half
 /// of them 995 in 1,000 are found.
@@ -106,12 +108,9 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         }
         let h = pose.scales.transfer(&(pose.rotation + pose.translation * plane.transpose()));
         let problem = self.transfer_problem(threshold);
-        let mut model = HomographyModel::new(&h)?;
-        for (loss, tolerance) in [(Loss::Tukey(threshold * T::TWO), 1e-2), (Loss::Truncated(threshold), 1e-6)]
-        {
-            model = HomographyModel::new(&problem.optimise(&model, &loss, 8, lit(tolerance)).model.0)?;
-        }
-        Some(model)
+        let loss = Loss::Tukey(threshold * T::TWO);
+        let start = HomographyModel::new(&h)?;
+        HomographyModel::new(&problem.optimise(&start, &loss, PLANE_PASSES, lit(1e-6)).model.0)
     }
 
     /// The inverse depth of a correspondence in view 1 under a pose, in baselines; none where it is not finite.
@@ -191,20 +190,21 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         sigma: T,
         mask: &mut [bool],
     ) -> Judgement<T> {
-        let problem = self.transfer_problem(sigma * lit(EXPLAINED_SIGMAS));
-        let loss = Loss::Truncated(problem.threshold);
-        let sums = problem.optimise(plane, &loss, 1, T::ZERO).equations;
-        let limit = problem.threshold * problem.threshold;
-        let variance = variance(&sums, problem.data.count, limit, 2);
+        let support = sigma * lit(PLANE_SIGMAS) * T::TWO;
+        let problem = self.transfer_problem(support);
+        let sums = problem.optimise(plane, &Loss::Tukey(support), 1, T::ZERO).equations;
+        let scatter = Scatter::new(problem.data, plane, support);
         let mut poses = Solutions::new();
         for &Twin { pose, normal, ratio, .. } in &twins {
             let rotation = pose.rotation.to_rotation_matrix().into_inner();
             let t = pose.translation.vector * ratio;
             let scales = &self.problem.scales;
-            let covariance = planar_covariance(&rotation, &t, &normal, plane, &sums, scales, variance);
+            let covariance = scatter
+                .factor()
+                .and_then(|factor| planar_covariance(&rotation, &t, &normal, plane, &sums, scales, factor));
             poses.push(PlanarPose { pose, normal, baseline_over_distance: ratio, covariance });
         }
         self.mark_transfer(&plane.0, mask);
-        Judgement { verdict: RelativePoseVerdict::Planar(poses), noise: sqrt(variance) }
+        Judgement { verdict: RelativePoseVerdict::Planar(poses), noise: sqrt(scatter.variance()) }
     }
 }
