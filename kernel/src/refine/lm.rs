@@ -179,8 +179,8 @@ where
     let mut left = data.count;
     // After the last block what is pending; one place for the derivatives keeps the code small.
     for block in data.blocks.iter().step_by(step).map(Some).chain(core::iter::once(None)) {
-        let (mut current, mut lanes) = (pending, filled);
-        if let Some(block) = block {
+        let packed;
+        let (current, lanes) = if let Some(block) = block {
             let (c, d) = block.residual(&f);
             let mut inside = [false; LANES];
             for l in 0..LANES {
@@ -197,29 +197,29 @@ where
             }
             if inside == [true; LANES] {
                 active += LANES as u32;
-                (current, lanes) = (*block, LANES);
+                (block, LANES)
             } else {
-                let mut ready = false;
+                let mut ready = None;
                 for l in 0..LANES {
                     if inside[l] {
                         pending.set_lane(filled, block, l);
                         filled += 1;
                         active += 1;
                         if filled == LANES {
-                            current = pending;
+                            ready = Some(pending);
                             filled = 0;
-                            ready = true;
                         }
                     }
                 }
-                if !ready {
-                    continue;
-                }
-                lanes = LANES;
+                let Some(full) = ready else { continue };
+                packed = full;
+                (&packed, LANES)
             }
-        }
+        } else {
+            (&pending, filled)
+        };
         if lanes > 0 {
-            sums.add(&M::rows(&frame, &current), loss, lanes);
+            sums.add(&M::rows(&frame, current), loss, lanes);
         }
     }
     let mut hessian = SMatrix::<T, P, P>::zeros();

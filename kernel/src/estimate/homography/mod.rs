@@ -259,7 +259,7 @@ impl<T: Real> Judge<'_, '_, T> {
         let data = problem.data;
         // What lies beyond the threshold takes part at a falling weight, as far as the noise of this plane may reach.
         let noise = sqrt(Scatter::new(data, best, problem.threshold * T::TWO).variance());
-        let [least, largest] = SUPPORT.map(|share| problem.threshold * lit(share));
+        let [least, largest] = [problem.threshold * lit(SUPPORT[0]), problem.threshold * lit(SUPPORT[1])];
         let support = min(max(noise * lit(SUPPORT_SIGMAS), least), largest);
         let minimum = problem.optimise(best, &Loss::Tukey(support), FINAL_PASSES, lit(1e-4));
         let Some(model) = HomographyModel::new(&minimum.model.0) else {

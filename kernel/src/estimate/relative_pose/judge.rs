@@ -210,7 +210,8 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
 
     /// Where the loss about a pose ends: as far as the noise of these correspondences reaches.
     fn support(&self, noise: T) -> T {
-        let [least, largest] = SUPPORT.map(|share| self.problem.threshold * lit(share));
+        let threshold = self.problem.threshold;
+        let [least, largest] = [threshold * lit(SUPPORT[0]), threshold * lit(SUPPORT[1])];
         min(max(noise * lit(SUPPORT_SIGMAS), least), largest)
     }
 

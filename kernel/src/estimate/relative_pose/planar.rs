@@ -69,8 +69,10 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         let threshold = sigma * lit(PLANE_SIGMAS);
         let mut entries = [InverseDepth { ray: Vector3::zeros(), value: T::ZERO, weight: T::ZERO }; ENTRIES];
         let used = core::cmp::min(inliers.len(), ENTRIES);
-        // In 64 bits, for indices of 32.
-        let place = |k: usize| (k as u64 * inliers.len() as u64 / core::cmp::max(used, 1) as u64) as usize;
+        // k len / used, without a product that 32 bits do not hold.
+        let (whole, rest) =
+            (inliers.len() / core::cmp::max(used, 1), inliers.len() % core::cmp::max(used, 1));
+        let place = |k: usize| k * whole + k * rest / core::cmp::max(used, 1);
         for (k, entry) in entries.iter_mut().enumerate().take(used) {
             *entry = inliers.get(place(k)).and_then(|&index| self.inverse_depth(pose, index))?;
         }

@@ -137,16 +137,16 @@ impl<T: Real> KnownRotation<T> {
                 total.data.0[1][1] += *variance;
                 let e = basis.transpose() * direction.to * (T::ONE / ahead);
                 let square = Ldlt::new(&total).map(|factors| e.dot(&factors.solve(&e)));
-                (square.filter(|_| ahead > T::ZERO), LIMIT_SQ_GRAVITY)
+                (square.filter(|_| ahead > T::ZERO), lit(LIMIT_SQ_GRAVITY))
             }
             Self::Rotation { rotation: known, covariance: own, .. } => {
                 let e = turn(&rotation, known);
                 let square = Ldlt::new(&(own + covariance)).map(|factors| e.dot(&factors.solve(&e)));
-                (square, LIMIT_SQ_ROTATION)
+                (square, lit(LIMIT_SQ_ROTATION))
             }
         };
         match square.filter(|square| *square >= T::ZERO && is_finite(*square)) {
-            Some(square) if square < lit(limit) => PriorFit::Fits(sqrt(square)),
+            Some(square) if square < limit => PriorFit::Fits(sqrt(square)),
             Some(square) => PriorFit::Contradicted(sqrt(square)),
             None => PriorFit::Contradicted(sqrt(T::MAX)),
         }

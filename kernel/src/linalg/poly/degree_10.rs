@@ -8,7 +8,7 @@
 
 use crate::Real;
 use crate::linalg::batch::{BATCH, Batch};
-use crate::real::{abs, lit, sqrt};
+use crate::real::{abs, from_u32, lit, sqrt};
 
 /// Coefficients of a polynomial of degree 10.
 type Coefficients<T> = [T; 11];
@@ -167,24 +167,12 @@ fn roots_in_chart<T: Real, const L: usize>(
 /// Bernstein coefficients on [0, 1] of the polynomial in `t = side * x`.
 #[inline]
 fn bernstein<T: Real>(c: &Coefficients<T>, side: T) -> Coefficients<T> {
-    // 1 / (10 choose i)
-    const WEIGHTS: [f64; 11] = [
-        1.0,
-        1.0 / 10.0,
-        1.0 / 45.0,
-        1.0 / 120.0,
-        1.0 / 210.0,
-        1.0 / 252.0,
-        1.0 / 210.0,
-        1.0 / 120.0,
-        1.0 / 45.0,
-        1.0 / 10.0,
-        1.0,
-    ];
+    // 10 choose i; whole numbers, for a table of f64 would be converted by software on a core without them.
+    const BINOMIALS: [u32; 11] = [1, 10, 45, 120, 210, 252, 210, 120, 45, 10, 1];
     let mut b = *c;
     let mut sign = T::ONE;
-    for (v, weight) in b.iter_mut().zip(WEIGHTS) {
-        *v = *v * lit(weight) * sign;
+    for (v, choices) in b.iter_mut().zip(BINOMIALS) {
+        *v = *v * (T::ONE / from_u32(choices)) * sign;
         sign *= side;
     }
     for level in 1..11 {
@@ -288,7 +276,7 @@ fn polygon_zero<T: Real>(b: &Coefficients<T>) -> T {
     for i in 1..10 {
         // The pair whose first member still has the sign of b[0] and whose second has not: the last such first member.
         if (b[i] < T::ZERO) == (b[0] < T::ZERO) {
-            (u, v, at) = (b[i], b[i + 1], lit(i as f64));
+            (u, v, at) = (b[i], b[i + 1], from_u32(i as u32));
         }
     }
     (at + u / (u - v)) * lit(0.1)
