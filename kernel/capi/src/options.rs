@@ -253,10 +253,9 @@ search_options!(
 );
 
 impl<T: Real> RelativePoseOptions<T> {
+    /// Inlined: the compiler sees where a library without priors has none, and drops what uses them.
+    #[inline(always)]
     pub(crate) fn to_kernel(self) -> Result<estimate::RelativePoseOptions<T>, Status> {
-        const NONE: u32 = enums::RelativePosePrior::None as u32;
-        const GRAVITY: u32 = enums::RelativePosePrior::Gravity as u32;
-        const ROTATION: u32 = enums::RelativePosePrior::Rotation as u32;
         let mut kernel = self.search();
         // Below 0 stands for the default.
         kernel.least_motion_px = match self.least_motion_px {
@@ -264,14 +263,17 @@ impl<T: Real> RelativePoseOptions<T> {
             motion if motion <= T::MAX => Some(motion),
             _ => return Err(Status::NotFinite),
         };
+        const NONE: u32 = enums::RelativePosePrior::None as u32;
+        const GRAVITY: u32 = enums::RelativePosePrior::Gravity as u32;
+        const ROTATION: u32 = enums::RelativePosePrior::Rotation as u32;
         kernel.prior = match self.prior {
             NONE => None,
-            GRAVITY => Some(estimate::RelativePosePrior::Gravity {
+            GRAVITY if cfg!(feature = "prior") => Some(estimate::RelativePosePrior::Gravity {
                 view1: self.prior_view1.into(),
                 view2: self.prior_view2.into(),
                 sigma_rad: self.prior_sigma_rad,
             }),
-            ROTATION => Some(estimate::RelativePosePrior::Rotation {
+            ROTATION if cfg!(feature = "prior") => Some(estimate::RelativePosePrior::Rotation {
                 rotation: rotation(&self.prior_rotation)?,
                 covariance: from_rows(self.prior_covariance),
             }),
@@ -294,13 +296,19 @@ impl<T: Real> FundamentalOptions<T> {
 }
 
 impl<T: Real> AbsolutePoseOptions<T> {
+    /// Inlined, as that of a relative pose.
+    #[inline(always)]
     pub(crate) fn to_kernel(self) -> Result<estimate::AbsolutePoseOptions<T>, Status> {
         let mut kernel = self.search();
-        kernel.gravity = flag(self.has_gravity)?.then(|| estimate::GravityPrior {
-            world: Vector3::from(self.gravity_world),
-            camera: Vector3::from(self.gravity_camera),
-            sigma_rad: self.gravity_sigma_rad,
-        });
+        kernel.gravity = match flag(self.has_gravity)? {
+            false => None,
+            true if cfg!(feature = "prior") => Some(estimate::GravityPrior {
+                world: Vector3::from(self.gravity_world),
+                camera: Vector3::from(self.gravity_camera),
+                sigma_rad: self.gravity_sigma_rad,
+            }),
+            true => return Err(Status::UnknownEnum),
+        };
         Ok(kernel)
     }
 }

@@ -7,7 +7,7 @@ use super::super::prior::PriorFit;
 use super::NEEDED;
 use super::hypothesis::PoseProblem;
 use super::options::AbsolutePoseOptions;
-use super::search::{Gravity, search};
+use super::search::{Gravity, aided_search};
 use super::shape::{Shape, shape_of_inliers};
 use super::verdict::{AbsolutePose, AbsolutePoseEstimate, AbsolutePoseVerdict};
 use super::workspace::AbsolutePoseWorkspace;
@@ -38,7 +38,8 @@ pub(super) struct Task<'a, T: Real> {
     pub(super) mean: Vector3<T>,
 }
 
-/// The verdict on loaded correspondences.
+/// The verdict on loaded correspondences. Inlined: of options without a prior the compiler then drops what uses one.
+#[inline(always)]
 pub(super) fn estimate<T: Real, B: ReprojectionBlock<T>>(
     task: &Task<'_, T>,
     focal: [T; 2],
@@ -56,9 +57,32 @@ pub(super) fn estimate<T: Real, B: ReprojectionBlock<T>>(
         }
         None => None,
     };
-    let (consensus, gravity) =
-        search(&task.options.ransac, task.gravity.as_ref(), &problem, order, guide.keep_going);
-    workspace.inliers.iter_mut().take(count).for_each(|inlier| *inlier = false);
+    let ransac_options = &task.options.ransac;
+    let (consensus, fit) = match &task.gravity {
+        Some(gravity) => aided_search(ransac_options, gravity, &problem, order, guide.keep_going),
+        None => (ransac::<T, _, 3>(&problem, ransac_options, order, NEEDED as u32, guide.keep_going), None),
+    };
+    // The prior takes part where it fits.
+    let gravity = match fit {
+        Some(PriorFit::Fits(_)) => task.gravity.as_ref(),
+        _ => None,
+    };
+    let mask = workspace.inliers.get_mut(..count).unwrap_or_default();
+    judged(task, &problem, &consensus, fit, gravity, mask)
+}
+
+/// The verdict on what a search found.
+#[inline(never)]
+fn judged<T: Real, B: ReprojectionBlock<T>>(
+    task: &Task<'_, T>,
+    problem: &PoseProblem<'_, T, B>,
+    consensus: &Consensus<CameraPose<T>, T>,
+    fit: Option<PriorFit<T>>,
+    gravity: Option<&Gravity<T>>,
+    mask: &mut [bool],
+) -> AbsolutePoseEstimate<T> {
+    let count = problem.data.count;
+    mask.iter_mut().for_each(|inlier| *inlier = false);
     let mut estimate = AbsolutePoseEstimate {
         verdict: AbsolutePoseVerdict::NoConsensus,
         gravity: None,
@@ -66,10 +90,10 @@ pub(super) fn estimate<T: Real, B: ReprojectionBlock<T>>(
         report: consensus.report,
     };
     let found = consensus.models[0].map(|(model, _)| model);
-    let believed = found.filter(|_| beyond_chance(task, &problem, &consensus));
+    let believed = found.filter(|_| beyond_chance(task, problem, consensus));
     // Points behind the camera show a depth-reversed shape that a part of them fits in front, too.
     let few = 2 * consensus.report.inliers < count as u32;
-    if few && behind_camera(task, &problem, &consensus) {
+    if few && behind_camera(task, problem, consensus) {
         estimate.verdict = AbsolutePoseVerdict::BehindCamera;
         return estimate;
     }
@@ -79,31 +103,27 @@ pub(super) fn estimate<T: Real, B: ReprojectionBlock<T>>(
         }
         return estimate;
     };
-    estimate.gravity = gravity;
-    let gravity = match gravity {
-        Some(PriorFit::Fits(_)) => task.gravity.as_ref(),
-        _ => None,
-    };
+    estimate.gravity = fit;
     let loss = Loss::Truncated(problem.threshold);
     let best = problem.optimise(&model, &loss, gravity, 12, lit(1e-6));
-    let mut mask = workspace.inliers.iter_mut();
+    let mut entries = mask.iter_mut();
     problem.for_each_block(&best.model, |_, relative, filled| {
-        for (inlier, &s) in mask.by_ref().take(filled).zip(relative) {
+        for (inlier, &s) in entries.by_ref().take(filled).zip(relative) {
             *inlier = s < T::ONE;
         }
     });
     let finish = |pose: &CameraPose<T>, sums: &NormalEquations<T, 6>| {
-        let variance = variance(task, &problem, sums);
+        let variance = variance(task, problem, sums);
         let active = from_u32::<T>(core::cmp::max(sums.active, 1));
         AbsolutePose {
             pose: shifted(&pose.pose(), &task.mean),
             covariance: covariance(&sums.hessian, variance, &(pose.rotation * task.mean)),
-            rms_px: sqrt(squares(&problem, sums) / active),
+            rms_px: sqrt(squares(problem, sums) / active),
         }
     };
     let first = finish(&best.model, &best.equations);
-    estimate.noise_px = sqrt(variance(task, &problem, &best.equations));
-    estimate.verdict = match shape_of_inliers(&problem, &best.model) {
+    estimate.noise_px = sqrt(variance(task, problem, &best.equations));
+    estimate.verdict = match shape_of_inliers(problem, &best.model) {
         Shape::Repeated => AbsolutePoseVerdict::Unobservable(Unobservable::TooFewDistinct),
         Shape::Line => AbsolutePoseVerdict::Unobservable(Unobservable::Collinear),
         Shape::Volume => AbsolutePoseVerdict::Pose(first),

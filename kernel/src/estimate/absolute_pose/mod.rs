@@ -85,6 +85,7 @@ const NEEDED: usize = 4;
 /// assert!(!workspace.inliers()[0] && workspace.inliers()[1]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+#[inline(always)]
 pub fn absolute_pose<T: Real>(
     camera: &impl CameraModel<T>,
     pixels: &[Vector2<T>],
@@ -117,6 +118,7 @@ pub fn absolute_pose<T: Real>(
 /// # Examples
 /// See [`relative_pose_guided`](super::relative_pose_guided) and [`homography_guided`](super::homography_guided), which
 /// take a guide alike.
+#[inline(always)]
 pub fn absolute_pose_guided<T: Real>(
     camera: &impl CameraModel<T>,
     pixels: &[Vector2<T>],

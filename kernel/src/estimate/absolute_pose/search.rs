@@ -40,17 +40,15 @@ impl<T: Real> Gravity<T> {
     }
 }
 
-/// The consensus by what priors there are, and what became of the prior.
-pub(super) fn search<T: Real, B: ReprojectionBlock<T>>(
+/// The consensus with a gravity prior, and what became of the prior.
+#[inline(never)]
+pub(super) fn aided_search<T: Real, B: ReprojectionBlock<T>>(
     options: &RansacOptions<T>,
-    gravity: Option<&Gravity<T>>,
+    gravity: &Gravity<T>,
     problem: &PoseProblem<'_, T, B>,
     order: Option<&[u32]>,
     mut keep_going: Option<&mut dyn FnMut(&Progress) -> bool>,
 ) -> (Consensus<CameraPose<T>, T>, Option<PriorFit<T>>) {
-    let Some(gravity) = gravity else {
-        return (ransac::<T, _, 3>(problem, options, order, NEEDED as u32, keep_going), None);
-    };
     let deviations_of = |consensus: &Consensus<CameraPose<T>, T>| {
         consensus.models[0].map_or(T::MAX, |(model, _)| gravity.deviation(&model))
     };

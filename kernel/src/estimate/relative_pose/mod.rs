@@ -65,10 +65,13 @@ impl<T: Real> Default for RelativePoseOptions<T> {
 }
 
 impl<T: Real> RelativePoseOptions<T> {
-    /// The prior, checked.
+    /// The prior, checked. Inlined: of options without a prior the compiler then sees that there is none.
+    #[inline(always)]
     fn known(&self) -> Result<Option<KnownRotation<T>>, RelativePoseError> {
-        let known = self.prior.as_ref().map(|prior| KnownRotation::new(prior).ok_or(TwoViewError::Prior));
-        known.transpose()
+        match &self.prior {
+            Some(prior) => KnownRotation::new(prior).ok_or(TwoViewError::Prior).map(Some),
+            None => Ok(None),
+        }
     }
 }
 
@@ -173,6 +176,7 @@ pub type RelativePoseError = TwoViewError;
 /// assert!(matches!(unaided.prior, Some(PriorFit::Contradicted(_))));
 /// assert_eq!(unaided.verdict, estimate.verdict);
 /// ```
+#[inline(always)]
 pub fn relative_pose<T: Real>(
     camera1: &impl CameraModel<T>,
     camera2: &impl CameraModel<T>,
@@ -224,6 +228,7 @@ pub fn relative_pose<T: Real>(
 /// assert_eq!((estimate.report.spent.iterations, estimate.pose()), (24, None));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+#[inline(always)]
 pub fn relative_pose_guided<T: Real>(
     camera1: &impl CameraModel<T>,
     camera2: &impl CameraModel<T>,
@@ -393,7 +398,8 @@ fn refine<T: Real, B: EpipolarBlock<T>>(
 /// The smallest consensus of interest to the search; the verdict asks for more where chance demands it.
 const LEAST_INLIERS: u32 = 10;
 
-/// The verdict on loaded correspondences.
+/// The verdict on loaded correspondences. Inlined: of options without a prior the compiler then drops what uses one.
+#[inline(always)]
 fn estimate<T: Real, B: EpipolarBlock<T>>(
     units: Units<T>,
     sigma_px: T,
@@ -401,6 +407,30 @@ fn estimate<T: Real, B: EpipolarBlock<T>>(
     known: Option<KnownRotation<T>>,
     guide: Guide<'_, T>,
     workspace: &mut RelativePoseWorkspace<'_, T>,
+) -> RelativePoseEstimate<T> {
+    match known {
+        Some(known) => {
+            judged(units, sigma_px, options, workspace, |judge: &Judge<'_, '_, T, B>, mask, order| {
+                aided::judgement(judge, &known, &options.ransac, guide, mask, order)
+            })
+        }
+        None => judged(units, sigma_px, options, workspace, |judge: &Judge<'_, '_, T, B>, mask, order| {
+            let ranked = ranked(guide.scores, order, mask.len());
+            let consensus = ransac(judge.problem, &options.ransac, ranked, LEAST_INLIERS, guide.keep_going);
+            let judgement = judge.judgement(&consensus, mask, order);
+            Aided { judgement, report: consensus.report, fit: None }
+        }),
+    }
+}
+
+/// The verdict by a way to search and judge.
+#[inline(never)]
+fn judged<T: Real, B: EpipolarBlock<T>>(
+    units: Units<T>,
+    sigma_px: T,
+    options: &RelativePoseOptions<T>,
+    workspace: &mut RelativePoseWorkspace<'_, T>,
+    judgement: impl FnOnce(&Judge<'_, '_, T, B>, &mut [bool], &mut [u32]) -> Aided<T>,
 ) -> RelativePoseEstimate<T> {
     let count = workspace.count;
     let blocks = B::slice(workspace.numbers);
@@ -413,16 +443,8 @@ fn estimate<T: Real, B: EpipolarBlock<T>>(
         least_motion: options.least_motion_px.unwrap_or(sigma_px * lit(EXPLAINED_SIGMAS)) / units.pixels,
         seed: options.ransac.seed,
     };
-    let (mask, order) = (workspace.inliers.get_mut(..count).unwrap_or_default(), &mut *workspace.order);
-    let Aided { judgement, mut report, fit } = match &known {
-        Some(known) => aided::judgement(&judge, known, &options.ransac, guide, mask, order),
-        None => {
-            let ranked = ranked(guide.scores, order, count);
-            let consensus = ransac(&problem, &options.ransac, ranked, LEAST_INLIERS, guide.keep_going);
-            let judgement = judge.judgement(&consensus, mask, order);
-            Aided { judgement, report: consensus.report, fit: None }
-        }
-    };
+    let mask = workspace.inliers.get_mut(..count).unwrap_or_default();
+    let Aided { judgement, mut report, fit } = judgement(&judge, mask, workspace.order);
     let Judgement { verdict, noise } = judgement;
     report.inliers = mask.iter().map(|&inlier| inlier as u32).sum();
     RelativePoseEstimate { verdict, prior: fit, noise_px: noise * units.pixels, report }
