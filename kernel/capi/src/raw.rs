@@ -40,14 +40,18 @@ pub(crate) type Bytes = Range<usize>;
 
 /// The addresses of `count` elements, which could be a slice.
 pub(crate) fn bytes_of<V>(pointer: *const V, count: usize) -> Result<Bytes, Status> {
-    if pointer.is_null() {
+    bytes_at(pointer.addr(), count, size_of::<V>(), align_of::<V>())
+}
+
+/// The same for any type.
+fn bytes_at(start: usize, count: usize, size: usize, align: usize) -> Result<Bytes, Status> {
+    if start == 0 {
         return Err(Status::NullPointer);
     }
-    if !pointer.is_aligned() {
+    if !start.is_multiple_of(align) {
         return Err(Status::Misaligned);
     }
-    let size = count.checked_mul(size_of::<V>()).filter(|&size| size <= isize::MAX as usize);
-    let start = pointer.addr();
+    let size = count.checked_mul(size).filter(|&size| size <= isize::MAX as usize);
     let end = size.and_then(|size| start.checked_add(size)).ok_or(Status::TooLarge)?;
     Ok(start..end)
 }
@@ -138,7 +142,9 @@ impl<V: Plain> Output<'_, V> {
 
     /// Writes the values that fit, and tells how many were written in all.
     pub(crate) fn write(&mut self, values: impl IntoIterator<Item = V>) -> usize {
-        values.into_iter().for_each(|value| self.push(value));
+        for value in values {
+            self.push(value);
+        }
         self.written
     }
 }

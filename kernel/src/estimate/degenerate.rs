@@ -17,6 +17,7 @@ const REPEATED_SIGMAS: f64 = 8.0;
 /// Points of both views on the plane: x1, y1, x2, y2.
 type Point<T> = [T; 4];
 
+#[cfg_attr(small, inline(never))]
 fn point<T: Real, B: EpipolarBlock<T>>(data: BlockSlice<'_, B>, index: u32) -> Option<Point<T>> {
     let (plane, _) = data.blocks.get(index as usize / LANES)?.planes();
     let lane = index as usize % LANES;

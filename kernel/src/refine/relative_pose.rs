@@ -41,7 +41,8 @@ impl<T: Real> Scales<T> {
     }
 
     /// `D2^-1 E D1^-1` with `D = diag(scales, 1)`.
-    #[inline]
+    #[cfg_attr(not(small), inline)]
+    #[cfg_attr(small, inline(never))]
     fn apply(&self, e: &Matrix3<T>) -> Matrix3<T> {
         let (a, b) = (self.inverse1(), self.inverse2());
         let m = &e.data.0;
@@ -52,6 +53,7 @@ impl<T: Real> Scales<T> {
     }
 
     /// `D2 H D1^-1`: a homography between normalised coordinates, for those of the blocks.
+    #[cfg_attr(small, inline(never))]
     pub(crate) fn transfer(&self, h: &Matrix3<T>) -> Matrix3<T> {
         let (a, b) = (self.inverse1(), self.view2);
         let m = &h.data.0;
@@ -87,7 +89,8 @@ impl<T: Real> Scales<T> {
 }
 
 /// A rotation near `Exp(w)`: exact as a rotation, equal to the exponential to second order (Cayley's map of w / 2).
-#[inline]
+#[cfg_attr(not(small), inline)]
+#[cfg_attr(small, inline(never))]
 pub(crate) fn cayley<T: Real>(w: &Vector3<T>) -> Matrix3<T> {
     let h = w * T::HALF;
     let s = T::TWO / (T::ONE + h.norm_squared());

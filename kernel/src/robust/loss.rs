@@ -48,7 +48,8 @@ impl<T: Real> Loss<T> {
     /// assert_eq!(Loss::Huber(2.0_f64).evaluate(1.0), (1.0, 1.0));
     /// assert_eq!(Loss::Huber(2.0_f64).evaluate(16.0), (2.0 * 2.0 * 4.0 - 4.0, 0.5));
     /// ```
-    #[inline]
+    #[cfg_attr(not(small), inline)]
+    #[cfg_attr(small, inline(never))]
     #[must_use]
     pub fn evaluate(&self, squared: T) -> (T, T) {
         let (one, zero) = (T::ONE, T::ZERO);

@@ -58,7 +58,8 @@ impl<'a, T: Real, B: ReprojectionBlock<T>> PoseProblem<'a, T, B> {
     }
 
     /// Squared residuals of a block in units of the squared threshold; of a point behind the camera, 1.
-    #[inline]
+    #[cfg_attr(not(small), inline)]
+    #[cfg_attr(small, inline(never))]
     fn relative(&self, block: &B, pose: &CameraPose<T>, scale: T) -> Lanes<T> {
         let (square, depth) = squared(block, pose, self.focal);
         let mut relative = [T::ZERO; LANES];

@@ -9,21 +9,21 @@ type Linear<T> = [T; 4];
 type Quadric<T> = [T; 10];
 pub(super) type Cubic<T> = [T; 20];
 
-#[inline(always)]
+#[cfg_attr(not(small), inline(always))]
 fn add<T: Real, const N: usize>(a: &[T; N], b: &[T; N]) -> [T; N] {
     let mut sum = *a;
     sum.iter_mut().zip(b).for_each(|(x, y)| *x += *y);
     sum
 }
 
-#[inline(always)]
+#[cfg_attr(not(small), inline(always))]
 fn sub<T: Real, const N: usize>(a: &[T; N], b: &[T; N]) -> [T; N] {
     let mut difference = *a;
     difference.iter_mut().zip(b).for_each(|(x, y)| *x -= *y);
     difference
 }
 
-#[inline(always)]
+#[cfg_attr(not(small), inline(always))]
 fn linear_times_linear<T: Real>(a: &Linear<T>, b: &Linear<T>) -> Quadric<T> {
     let cross = |i: usize, j: usize| a[i] * b[j] + a[j] * b[i];
     [
@@ -40,7 +40,7 @@ fn linear_times_linear<T: Real>(a: &Linear<T>, b: &Linear<T>) -> Quadric<T> {
     ]
 }
 
-#[inline(always)]
+#[cfg_attr(not(small), inline(always))]
 fn quadric_times_linear<T: Real>(q: &Quadric<T>, l: &Linear<T>) -> Cubic<T> {
     [
         q[0] * l[0],

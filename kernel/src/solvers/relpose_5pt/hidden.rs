@@ -134,7 +134,7 @@ impl<T: Real> HiddenRow<T> {
         Self([x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3], o[0], o[1], o[2], o[3], o[4]])
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
     fn dot(&self, other: &Self) -> T {
         // Four sums, so that no addition waits for the one before it.
         let mut sum = [T::ZERO; 4];
