@@ -96,7 +96,7 @@ pub(super) fn on_a_line<T: Real, B: EpipolarBlock<T>>(
     accident: T,
 ) -> bool {
     let outside = (data.count as u32).saturating_sub(inliers.len() as u32);
-    line_with(data, inliers, sigma, |off| !beyond_chance(outside + off, off, 2, accident))
+    line_with(data, inliers, sigma, &|off| !beyond_chance(outside + off, off, 2, accident))
 }
 
 /// True where at least half of all correspondences, and more than chance explains, lie on one line in both views,
@@ -108,7 +108,7 @@ pub(super) fn mostly_on_a_line<T: Real, B: EpipolarBlock<T>>(
 ) -> bool {
     let band = line_accident(data, sigma * lit(EXPLAINED_SIGMAS));
     let count = all.len() as u32;
-    line_with(data, all, sigma, |off| 2 * off <= count && beyond_chance(count, count - off, 2, band))
+    line_with(data, all, sigma, &|off| 2 * off <= count && beyond_chance(count, count - off, 2, band))
 }
 
 /// True where an acceptable number of the inliers lie off some line of least squares.
@@ -116,7 +116,7 @@ fn line_with<T: Real, B: EpipolarBlock<T>>(
     data: BlockSlice<'_, B>,
     inliers: &[u32],
     sigma: T,
-    acceptable: impl Fn(u32) -> bool,
+    acceptable: &dyn Fn(u32) -> bool,
 ) -> bool {
     let total = inliers.len() as u32;
     let limit = sigma * sigma * lit(EXPLAINED_SIGMAS * EXPLAINED_SIGMAS);

@@ -33,7 +33,6 @@ const MAX_BEHIND: u32 = 300;
 pub(super) struct Task<'a, T: Real> {
     pub(super) options: &'a AbsolutePoseOptions<T>,
     pub(super) sigma_px: T,
-    pub(super) gravity: Option<Gravity<T>>,
     /// Subtracted from the points.
     pub(super) mean: Vector3<T>,
 }
@@ -42,6 +41,7 @@ pub(super) struct Task<'a, T: Real> {
 #[inline(always)]
 pub(super) fn estimate<T: Real, B: ReprojectionBlock<T>>(
     task: &Task<'_, T>,
+    gravity: Option<Gravity<T>>,
     focal: [T; 2],
     guide: Guide<'_, T>,
     workspace: &mut AbsolutePoseWorkspace<'_, T>,
@@ -58,17 +58,21 @@ pub(super) fn estimate<T: Real, B: ReprojectionBlock<T>>(
         None => None,
     };
     let ransac_options = &task.options.ransac;
-    let (consensus, fit) = match &task.gravity {
-        Some(gravity) => aided_search(ransac_options, gravity, &problem, order, guide.keep_going),
-        None => (ransac::<T, _, 3>(&problem, ransac_options, order, NEEDED as u32, guide.keep_going), None),
-    };
-    // The prior takes part where it fits.
-    let gravity = match fit {
-        Some(PriorFit::Fits(_)) => task.gravity.as_ref(),
-        _ => None,
+    let (consensus, fit, gravity) = match gravity {
+        Some(gravity) => {
+            let (consensus, fit) = aided_search(ransac_options, &gravity, &problem, order, guide.keep_going);
+            // The prior takes part where it fits.
+            let fits = matches!(fit, Some(PriorFit::Fits(_)));
+            (consensus, fit, fits.then_some(gravity))
+        }
+        None => {
+            let consensus =
+                ransac::<T, _, 3>(&problem, ransac_options, order, NEEDED as u32, guide.keep_going);
+            (consensus, None, None)
+        }
     };
     let mask = workspace.inliers.get_mut(..count).unwrap_or_default();
-    judged(task, &problem, &consensus, fit, gravity, mask)
+    judged(task, &problem, &consensus, fit, gravity.as_ref(), mask)
 }
 
 /// The verdict on what a search found.

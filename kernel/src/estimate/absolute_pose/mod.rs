@@ -151,7 +151,7 @@ pub fn absolute_pose_guided<T: Real>(
     for point in points {
         mean += point * share;
     }
-    let task = Task { options, sigma_px, gravity, mean };
+    let task = Task { options, sigma_px, mean };
     let pairs = pixels.iter().zip(points).map(|(pixel, point)| (pixel, point - mean));
     Ok(match focal {
         Some((fx, fy)) => {
@@ -165,14 +165,14 @@ pub fn absolute_pose_guided<T: Real>(
                     [u, v, p.x, p.y, p.z]
                 }),
             );
-            estimate::<T, PlanePointBlock<T>>(&task, [fx, fy], guide, workspace)
+            estimate::<T, PlanePointBlock<T>>(&task, gravity, [fx, fy], guide, workspace)
         }
         None => {
             fill::<T, BearingPointBlock<T>, 12>(
                 workspace.numbers,
                 pairs.map(|(pixel, p)| bearing_rows(camera, pixel, &p)),
             );
-            estimate::<T, BearingPointBlock<T>>(&task, [camera.focal(); 2], guide, workspace)
+            estimate::<T, BearingPointBlock<T>>(&task, gravity, [camera.focal(); 2], guide, workspace)
         }
     })
 }
