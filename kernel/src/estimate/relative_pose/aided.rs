@@ -250,7 +250,7 @@ pub(super) fn judgement<T: Real, B: EpipolarBlock<T>>(
     mask: &mut [bool],
     order: &mut [u32],
 ) -> Aided<T> {
-    let problem = PoseProblem { prior: Some((*known, plain.sigma * plain.sigma)), ..*plain.problem };
+    let problem = PoseProblem { prior: Some((known, plain.sigma * plain.sigma)), ..*plain.problem };
     let aided = Judge { problem: &problem, ..*plain };
     let Guide { scores, mut keep_going } = guide;
     // Reborrowed, for a second search may need it.

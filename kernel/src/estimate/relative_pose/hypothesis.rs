@@ -19,10 +19,10 @@ use crate::solvers::relpose_5pt;
 
 use super::super::chance::EXPLAINED_SIGMAS;
 use super::super::stride;
-use super::prior::KnownRotation;
+use super::prior::RotationPrior;
 
 /// Correspondences and what a score of them needs.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(super) struct PoseProblem<'a, T: Real, B> {
     pub(super) data: BlockSlice<'a, B>,
     pub(super) scales: Scales<T>,
@@ -32,7 +32,7 @@ pub(super) struct PoseProblem<'a, T: Real, B> {
     pub(super) stride: usize,
     /// What is known of the rotation and enters every optimisation, and the variance of a residual that it is weighed
     /// against.
-    pub(super) prior: Option<(KnownRotation<T>, T)>,
+    pub(super) prior: Option<(&'a dyn RotationPrior<T>, T)>,
 }
 
 /// Blocks scored between two looks at the gate.

@@ -386,7 +386,7 @@ fn refine<T: Real, B: EpipolarBlock<T>>(
     let plain = judge.refined(pose, mask)?;
     match known.filter(|known| known.fits(&plain)) {
         Some(known) => {
-            let problem = PoseProblem { prior: Some((known, judge.sigma * judge.sigma)), ..problem };
+            let problem = PoseProblem { prior: Some((&known, judge.sigma * judge.sigma)), ..problem };
             let aided = Judge { problem: &problem, ..judge }.refined(&plain.pose, mask);
             // The mask is of the last refinement: without an aided one, of the plain one again.
             if aided.is_some() { aided } else { judge.refined(pose, mask) }

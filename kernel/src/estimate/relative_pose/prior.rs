@@ -37,6 +37,15 @@ pub enum RelativePosePrior<T: Real> {
 const LIMIT_SQ_GRAVITY: f64 = 18.42;
 const LIMIT_SQ_ROTATION: f64 = 21.11;
 
+/// A prior as the refinement sees it: behind a pointer, so that a program without priors holds no code for them.
+pub(super) trait RotationPrior<T: Real> {
+    /// Adds the squared deviation of a rotation from the prior, in units of the prior's covariance over `variance`, to
+    /// equations whose first three unknowns turn it.
+    fn add(&self, sums: &mut NormalEquations<T, 5>, rotation: &Matrix3<T>, variance: T);
+    /// The squared deviation of a rotation from the prior, in units of the prior's covariance.
+    fn cost(&self, rotation: &Matrix3<T>) -> T;
+}
+
 /// A prior that has been checked.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum KnownRotation<T: Real> {
@@ -48,6 +57,37 @@ pub(super) enum KnownRotation<T: Real> {
     },
     /// All of it.
     Rotation { rotation: UnitQuaternion<T>, covariance: Matrix3<T>, information: Matrix3<T> },
+}
+
+impl<T: Real> RotationPrior<T> for KnownRotation<T> {
+    fn add(&self, sums: &mut NormalEquations<T, 5>, rotation: &Matrix3<T>, variance: T) {
+        match self {
+            Self::Gravity { direction, variance: own } => direction.add(sums, rotation, variance / *own),
+            Self::Rotation { rotation: known, information, .. } => {
+                let e = turn(rotation, known);
+                let g = information * e;
+                for p in 0..3 {
+                    sums.gradient.data.0[0][p] += variance * g.data.0[0][p];
+                    for q in 0..3 {
+                        sums.hessian.data.0[q][p] += variance * information.data.0[q][p];
+                    }
+                }
+                sums.cost += variance * e.dot(&g);
+            }
+        }
+    }
+
+    fn cost(&self, rotation: &Matrix3<T>) -> T {
+        match self {
+            Self::Gravity { direction, variance } => {
+                (rotation * direction.from - direction.to).norm_squared() / *variance
+            }
+            Self::Rotation { rotation: known, information, .. } => {
+                let e = turn(rotation, known);
+                e.dot(&(information * e))
+            }
+        }
+    }
 }
 
 impl<T: Real> KnownRotation<T> {
@@ -81,44 +121,6 @@ impl<T: Real> KnownRotation<T> {
         match self {
             Self::Gravity { variance, .. } => *variance,
             Self::Rotation { covariance, .. } => covariance.trace() / lit(3.0),
-        }
-    }
-
-    /// Adds the squared deviation of a rotation from the prior, in units of the prior's covariance over `variance`, to
-    /// equations whose first three unknowns turn it.
-    pub(super) fn add<const P: usize>(
-        &self,
-        sums: &mut NormalEquations<T, P>,
-        rotation: &Matrix3<T>,
-        variance: T,
-    ) {
-        const { assert!(P >= 3, "the rotation comes first") };
-        match self {
-            Self::Gravity { direction, variance: own } => direction.add(sums, rotation, variance / *own),
-            Self::Rotation { rotation: known, information, .. } => {
-                let e = turn(rotation, known);
-                let g = information * e;
-                for p in 0..3 {
-                    sums.gradient.data.0[0][p] += variance * g.data.0[0][p];
-                    for q in 0..3 {
-                        sums.hessian.data.0[q][p] += variance * information.data.0[q][p];
-                    }
-                }
-                sums.cost += variance * e.dot(&g);
-            }
-        }
-    }
-
-    /// The squared deviation of a rotation from the prior, in units of the prior's covariance.
-    pub(super) fn cost(&self, rotation: &Matrix3<T>) -> T {
-        match self {
-            Self::Gravity { direction, variance } => {
-                (rotation * direction.from - direction.to).norm_squared() / *variance
-            }
-            Self::Rotation { rotation: known, information, .. } => {
-                let e = turn(rotation, known);
-                e.dot(&(information * e))
-            }
         }
     }
 
