@@ -300,6 +300,7 @@ pub(crate) struct RotationModel<T: Real> {
 }
 
 impl<T: Real> Manifold<T, 3> for RotationModel<T> {
+    #[cfg_attr(small, inline(never))]
     fn matrix(&self) -> Matrix3<T> {
         self.scales.transfer(&self.rotation)
     }

@@ -140,7 +140,8 @@ pub(crate) struct PoseFrame<T: Real> {
 }
 
 impl<T: Real> Manifold<T, 5> for PoseModel<T> {
-    #[inline]
+    #[cfg_attr(not(small), inline)]
+    #[cfg_attr(small, inline(never))]
     fn matrix(&self) -> Matrix3<T> {
         self.scales.apply(&self.essential())
     }

@@ -10,6 +10,7 @@ type Quadric<T> = [T; 10];
 pub(super) type Cubic<T> = [T; 20];
 
 #[cfg_attr(not(small), inline(always))]
+#[cfg_attr(small, inline(never))]
 fn add<T: Real, const N: usize>(a: &[T; N], b: &[T; N]) -> [T; N] {
     let mut sum = *a;
     sum.iter_mut().zip(b).for_each(|(x, y)| *x += *y);
