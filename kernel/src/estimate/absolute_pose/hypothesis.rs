@@ -87,6 +87,7 @@ impl<'a, T: Real, B: ReprojectionBlock<T>> PoseProblem<'a, T, B> {
     }
 
     /// Calls `each` with the world point of every inlier.
+    #[cfg_attr(not(small), inline(always))]
     pub(super) fn for_each_inlier(&self, pose: &CameraPose<T>, each: &mut dyn FnMut(Vector3<T>)) {
         self.for_each_block(pose, |block, relative, filled| {
             let [x, y, z] = block.points();
