@@ -86,9 +86,16 @@ impl<'a, T: Real, B: ReprojectionBlock<T>> PoseProblem<'a, T, B> {
         }
     }
 
-    /// Calls `each` with the world point of every inlier.
-    #[cfg_attr(not(small), inline(always))]
-    pub(super) fn for_each_inlier(&self, pose: &CameraPose<T>, each: &mut dyn FnMut(Vector3<T>)) {
+    /// Calls `each` with the world point of every inlier: through a pointer where code is to be small.
+    pub(super) fn for_each_inlier(&self, pose: &CameraPose<T>, mut each: impl FnMut(Vector3<T>)) {
+        if cfg!(small) {
+            self.each_inlier::<dyn FnMut(_) + '_>(pose, &mut each);
+        } else {
+            self.each_inlier(pose, &mut each);
+        }
+    }
+
+    fn each_inlier<F: FnMut(Vector3<T>) + ?Sized>(&self, pose: &CameraPose<T>, each: &mut F) {
         self.for_each_block(pose, |block, relative, filled| {
             let [x, y, z] = block.points();
             for l in 0..LANES {

@@ -32,9 +32,9 @@ pub(super) fn shape_of_inliers<T: Real, B: ReprojectionBlock<T>>(
 ) -> Shape<T> {
     let mut distinct: [Option<Vector3<T>>; 4] = [None; 4];
     let mut largest = T::ZERO;
-    problem.for_each_inlier(pose, &mut |x| largest = max(x.norm_squared(), largest));
+    problem.for_each_inlier(pose, |x| largest = max(x.norm_squared(), largest));
     let tiny = largest * (T::EPSILON * T::EPSILON * lit::<T>(64.0));
-    problem.for_each_inlier(pose, &mut |x| {
+    problem.for_each_inlier(pose, |x| {
         for slot in &mut distinct {
             match slot {
                 Some(known) if (*known - x).norm_squared() <= tiny => return,
@@ -57,7 +57,7 @@ pub(super) fn shape_of_inliers<T: Real, B: ReprojectionBlock<T>>(
     let line = if trimmed.count > 4 { trimmed } else { all };
     let focal = (problem.focal[0] + problem.focal[1]) * T::HALF;
     let mut off = 0u32;
-    problem.for_each_inlier(pose, &mut |x| {
+    problem.for_each_inlier(pose, |x| {
         let depth_sq = (pose.rotation * x + pose.translation).norm_squared();
         let resolved = problem.threshold / focal;
         off += (line.off_line_sq(&x) > resolved * resolved * depth_sq) as u32;
@@ -101,7 +101,7 @@ impl<T: Real> Axes<T> {
     ) -> Self {
         let counts = |x: &Vector3<T>| near.is_none_or(|(line, limit)| line.off_line_sq(x) <= limit);
         let (mut sum, mut count) = (Vector3::zeros(), 0u32);
-        problem.for_each_inlier(pose, &mut |x| {
+        problem.for_each_inlier(pose, |x| {
             if counts(&x) {
                 sum += x;
                 count += 1;
@@ -109,7 +109,7 @@ impl<T: Real> Axes<T> {
         });
         let mean = sum * (T::ONE / from_u32(core::cmp::max(count, 1)));
         let mut scatter = Matrix3::zeros();
-        problem.for_each_inlier(pose, &mut |x| {
+        problem.for_each_inlier(pose, |x| {
             if counts(&x) {
                 let d = x - mean;
                 scatter += d * d.transpose();
