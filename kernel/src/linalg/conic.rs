@@ -15,10 +15,10 @@ const MAX_STEPS: usize = 40;
 /// One real root of `x^3 + c2 x^2 + c1 x + c0`: where there are three, the one farthest from the other two, which is
 /// the best conditioned.
 ///
-/// Householder's method of order three from beyond that root, where the cubic is convex: the steps only approach it, without trigonometry
-/// or cube roots. The start is where the parabola that touches the cubic at its extremum has its root, or above the
-/// root of a monotone cubic. The error after a step is of the order of its fourth power; the last step is below
-/// `last_step` of the distance to the other roots.
+/// Householder's method of order three from beyond that root, where the cubic is convex: the steps only approach it,
+/// without trigonometry or cube roots. The start is where the parabola that touches the cubic at its extremum has its root,
+/// or above the root of a monotone cubic. The error after a step is of the order of its fourth power; the last step is below
+/// `last_step` of the distance to the inflection.
 #[inline]
 pub(crate) fn real_root_of_cubic<T: Real>(c2: T, c1: T, c0: T, last_step: T) -> T {
     let three = lit::<T>(3.0);
@@ -30,7 +30,8 @@ pub(crate) fn real_root_of_cubic<T: Real>(c2: T, c1: T, c0: T, last_step: T) -> 
     // Beyond the root: for p > 0 the root of the parabola that touches at the extremum, else (mean inequality)
     // t^3 - 3 p t >= 2 sqrt(-3 p) t^2 > 3 sqrt(-p) t^2. One formula for both, without a branch.
     let size = abs(p);
-    let extremum = sqrt(max(size, T::EPSILON * (c2 * c2) + T::MIN_POSITIVE));
+    // The floor keeps the start of a nearly triple root within some steps of it.
+    let extremum = sqrt(max(size, T::EPSILON * (c2 * c2 + abs(q)) + T::MIN_POSITIVE));
     let above = if p > T::ZERO { extremum } else { T::ZERO };
     let t = above + sqrt((abs(q) / extremum + (size + p)) * lit::<T>(1.0 / 3.0));
     let mut x = if q > T::ZERO { centre - t } else { centre + t };
@@ -43,19 +44,18 @@ pub(crate) fn real_root_of_cubic<T: Real>(c2: T, c1: T, c0: T, last_step: T) -> 
         f * (square - product) / (slope * (square - product - product) + f * f)
     };
     x -= step(x);
-    let tolerance = last_step * t;
     for _ in 0..MAX_STEPS {
         let step = step(x);
         x -= step;
-        if !(abs(step) > tolerance) {
+        if !(abs(step) > last_step * abs(x - centre)) {
             break;
         }
     }
     x
 }
 
-/// Lines `p`, `q` with `c ~ p q' + q p'`, for a symmetric `c` (its upper triangle) of rank two whose lines are real; where they are not,
-/// the nearest double line.
+/// Lines `p`, `q` with `c ~ p q' + q p'`, for a symmetric `c` (its upper triangle) of rank two whose lines are real;
+/// where they are not, the nearest double line.
 #[inline]
 pub(crate) fn lines_of_conic<T: Real>([c00, c01, c02, c11, c12, c22]: [T; 6]) -> [Vector3<T>; 2] {
     // The adjugate is -v v' with v = p x q (up to a factor); the first entry of v is not needed, and of the others the
@@ -70,4 +70,35 @@ pub(crate) fn lines_of_conic<T: Real>([c00, c01, c02, c11, c12, c22]: [T; 6]) ->
     let v2 = if a11 >= a22 { other } else { root };
     // c + [v]x = 2 q p': rank one, its first row and first column are the lines.
     [Vector3::new(c00, c01 - v2, c02 + v1), Vector3::new(c00, c01 + v2, c02 - v1)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The value of the cubic at the root, over what its terms round to.
+    fn misses<T: Real>([c2, c1, c0]: [f64; 3]) -> f64 {
+        let x = real_root_of_cubic::<T>(lit(c2), lit(c1), lit(c0), T::EPSILON).to_f64();
+        let terms = x.abs().powi(3) + (c2 * x * x).abs() + (c1 * x).abs() + c0.abs();
+        (((x + c2) * x + c1) * x + c0).abs() / (terms * T::EPSILON.to_f64())
+    }
+
+    #[test]
+    fn roots_of_any_cubic() {
+        let nearly_triple = [
+            [0.0, 0.0, -1.0],
+            [0.0, 0.0, 1.0],
+            [1e-8, 0.0, -1.0],
+            [0.0, 1e-12, -1.0],
+            [0.0, 0.0, 1e-9],
+            [0.0, 0.0, -1e9],
+            [3.0, 3.0, 2.0],
+            [-3.0, 3.0, -1.0 + 1e-3],
+        ];
+        let plain = [[0.0, -1.0, 0.0], [-6.0, 11.0, -6.0], [2.0, -5.0, 1.0], [-1e3, 1.0, 5.0]];
+        for cubic in nearly_triple.into_iter().chain(plain) {
+            assert!(misses::<f32>(cubic) < 16.0, "f32 {cubic:?}");
+            assert!(misses::<f64>(cubic) < 16.0, "f64 {cubic:?}");
+        }
+    }
 }

@@ -131,9 +131,10 @@ pub(crate) type PlaneBlock<T> = [Lanes<T>; 4];
 /// view 1 and of view 2 as xx, xy, xz, yy, yz, zz.
 pub(crate) type BearingBlock<T> = [Lanes<T>; 18];
 
+/// Zero where a point lies on both epipoles, or as good as.
 #[inline(always)]
 fn inverse_or_zero<T: Real>(d: T) -> T {
-    if d > T::ZERO { T::ONE / d } else { T::ZERO }
+    if d >= T::MIN_POSITIVE { T::ONE / d } else { T::ZERO }
 }
 
 impl<T: Real> EpipolarBlock<T> for PlaneBlock<T> {

@@ -141,7 +141,7 @@ impl<T: Real, B: EpipolarBlock<T>> Evidence<'_, '_, T, B> {
                     if own < limit && other < limit {
                         cc += own;
                         ee += other;
-                        ce += c[l] * e[l] * scale / sqrt(d[l] * f[l]);
+                        ce += c[l] * e[l] * scale / (sqrt(d[l]) * sqrt(f[l]));
                         n += T::ONE;
                     }
                 }
