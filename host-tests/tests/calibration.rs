@@ -1,7 +1,7 @@
 //! Covariances against Monte Carlo: the normalised squared error of an estimate has as its mean the number of its degrees
 //! of freedom. 1,000 trials a row, or as many as `EPIPOLE_TRIALS` says: every row must lie within the two-sided 95 % bounds
-//! of that number of trials. Poses that outliers led astray (beyond six times the freedom, at most 2 in 100) are counted
-//! and not averaged.
+//! of that number of trials (of another number than 1,000 one row in twenty misses them by chance). Poses that outliers led
+//! astray (beyond six times the freedom, at most 2 in 100) are counted and not averaged.
 
 use epipole::estimate::{
     GeneralMotion, HomographyOptions, HomographyVerdict, PlanarPose, RelativePoseOptions,

@@ -224,7 +224,6 @@ fn extreme_numbers<T: Real>() {
 fn budgets<T: Real>() {
     let problem = noisy(Motion::General, Shape::Volume).outliers(0.9).generate(3);
     let mut options = options::<T>();
-    options.ransac.budget.max_residuals = 5_000;
     let (estimate, _) = estimate_scene(&problem, &options).unwrap();
     assert_eq!(estimate.report.stop, StopReason::MaxResiduals);
     // For any budget the search stays within it but for one refinement: five passes, one score, and seven passes

@@ -610,7 +610,7 @@ typedef struct epi_relative_pose_options_f32 {
     float prior_rotation[4];
     // Covariance of w of `R <- Exp(w) R`, rad^2: 3x3 by rows.
     float prior_covariance[3][3];
-    // What is known: one of `epi_relative_pose_prior`.
+    // What is known: one of `epi_relative_pose_prior`, of which a library without the feature `prior` takes none.
     uint32_t prior;
 } epi_relative_pose_options_f32;
 
@@ -782,7 +782,7 @@ typedef struct epi_absolute_pose_options_f32 {
     float gravity_camera[3];
     // Standard deviation of the angle between the two, rad.
     float gravity_sigma_rad;
-    // 1 if gravity is known, else 0 and the three above are ignored.
+    // 1 if gravity is known (not in a library without the feature `prior`), else 0 and the three above are ignored.
     uint32_t has_gravity;
 } epi_absolute_pose_options_f32;
 
@@ -1032,7 +1032,7 @@ typedef struct epi_relative_pose_options_f64 {
     double prior_rotation[4];
     // Covariance of w of `R <- Exp(w) R`, rad^2: 3x3 by rows.
     double prior_covariance[3][3];
-    // What is known: one of `epi_relative_pose_prior`.
+    // What is known: one of `epi_relative_pose_prior`, of which a library without the feature `prior` takes none.
     uint32_t prior;
 } epi_relative_pose_options_f64;
 
@@ -1200,7 +1200,7 @@ typedef struct epi_absolute_pose_options_f64 {
     double gravity_camera[3];
     // Standard deviation of the angle between the two, rad.
     double gravity_sigma_rad;
-    // 1 if gravity is known, else 0 and the three above are ignored.
+    // 1 if gravity is known (not in a library without the feature `prior`), else 0 and the three above are ignored.
     uint32_t has_gravity;
 } epi_absolute_pose_options_f64;
 

@@ -46,7 +46,7 @@ pub struct RelativePoseOptions<T> {
     pub prior_rotation: [T; 4],
     /// Covariance of w of `R <- Exp(w) R`, rad^2: 3x3 by rows.
     pub prior_covariance: [[T; 3]; 3],
-    /// What is known: one of `epi_relative_pose_prior`.
+    /// What is known: one of `epi_relative_pose_prior`, of which a library without the feature `prior` takes none.
     pub prior: u32,
 }
 
@@ -126,7 +126,7 @@ pub struct AbsolutePoseOptions<T> {
     pub gravity_camera: [T; 3],
     /// Standard deviation of the angle between the two, rad.
     pub gravity_sigma_rad: T,
-    /// 1 if gravity is known, else 0 and the three above are ignored.
+    /// 1 if gravity is known (not in a library without the feature `prior`), else 0 and the three above are ignored.
     pub has_gravity: u32,
 }
 
@@ -256,6 +256,9 @@ impl<T: Real> RelativePoseOptions<T> {
     /// Inlined: the compiler sees where a library without priors has none, and drops what uses them.
     #[inline(always)]
     pub(crate) fn to_kernel(self) -> Result<estimate::RelativePoseOptions<T>, Status> {
+        const NONE: u32 = enums::RelativePosePrior::None as u32;
+        const GRAVITY: u32 = enums::RelativePosePrior::Gravity as u32;
+        const ROTATION: u32 = enums::RelativePosePrior::Rotation as u32;
         let mut kernel = self.search();
         // Below 0 stands for the default.
         kernel.least_motion_px = match self.least_motion_px {
@@ -263,9 +266,6 @@ impl<T: Real> RelativePoseOptions<T> {
             motion if motion <= T::MAX => Some(motion),
             _ => return Err(Status::NotFinite),
         };
-        const NONE: u32 = enums::RelativePosePrior::None as u32;
-        const GRAVITY: u32 = enums::RelativePosePrior::Gravity as u32;
-        const ROTATION: u32 = enums::RelativePosePrior::Rotation as u32;
         kernel.prior = match self.prior {
             NONE => None,
             GRAVITY if cfg!(feature = "prior") => Some(estimate::RelativePosePrior::Gravity {

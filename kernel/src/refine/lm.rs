@@ -16,7 +16,7 @@ pub(crate) trait Manifold<T: Real, const P: usize>: Copy {
     fn retract(&self, step: &SVector<T, P>) -> Self;
 }
 
-/// A model whose matrix is seen by its derivatives alone.
+/// A model given by the derivatives of its matrix.
 pub(crate) trait Tangents<T: Real, const P: usize>: Manifold<T, P> {
     /// The derivative of the matrix by each local parameter, row by row.
     fn tangents(&self) -> [[T; 9]; P];
@@ -26,7 +26,7 @@ pub(crate) trait Tangents<T: Real, const P: usize>: Manifold<T, P> {
 pub(crate) trait EpipolarModel<T: Real, const P: usize>: Manifold<T, P> {
     /// What is computed once a pass.
     type Frame;
-    /// It.
+    /// What a pass over the data needs of the model.
     fn frame(&self) -> Self::Frame;
     /// The residuals of a block and their derivatives.
     fn rows<B: EpipolarBlock<T>>(frame: &Self::Frame, block: &B) -> Rows<T, P>;

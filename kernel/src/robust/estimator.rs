@@ -19,7 +19,8 @@ pub trait Estimator<T: Real, const S: usize> {
     const NEAR_MISS_INTERVAL: u32 = 32;
 
     /// How many local optimisations must have led to the best optimum for a run to end with the samples that one of
-    /// inliers only takes: more than one where samples of noisy inliers lead to different optima.
+    /// inliers only takes: more than one where samples of noisy inliers lead to different optima. Half as many, rounded up,
+    /// do where most correspondences agree with the best one and nothing rivals it.
     const DISCOVERIES: u32 = 1;
 
     /// Residuals of one correspondence that [`polish`](Self::polish) and [`score`](Self::score) together evaluate at the
@@ -33,7 +34,7 @@ pub trait Estimator<T: Real, const S: usize> {
     /// and nothing handed over, where the sample was rejected as degenerate before it was solved.
     fn generate(&self, sample: &[u32; S], found: &mut impl FnMut(&Self::Model)) -> bool;
 
-    /// A hypothesis as it is to be scored; none where it is not worth that: where it cannot cost less than `bound`, which
+    /// A hypothesis as it is to be scored; none where it is not worth that: where it is unlikely to cost less than `bound`, which
     /// is none at first (`T::MAX`). Serves problems whose minimal models are off by more than the noise. Adds the residuals
     /// evaluated.
     fn polish(&self, model: &Self::Model, _bound: T, _counts: &mut ScoreCounts) -> Option<Self::Model> {

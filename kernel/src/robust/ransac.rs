@@ -14,7 +14,8 @@ pub const KEPT: usize = 4;
 /// A sample's best hypothesis is optimised where it explains this share of what the best minimal model does: the
 /// best minimal model need not lie in the best basin.
 const SLACK: f64 = 0.7;
-/// Until the best optimum has been met [`Estimator::DISCOVERIES`] times, the run lasts so many times as long.
+/// Until the best optimum has been met [`Estimator::DISCOVERIES`] times (half as many where most agree with it and nothing
+/// rivals it), the run lasts so many times as long.
 const PATIENCE: u32 = 5;
 /// Optima whose costs differ by less than this share of the correspondences count as the same one; where most agree, also
 /// those that differ by less than one correspondence.
@@ -38,8 +39,8 @@ pub struct Consensus<M, T> {
 /// The best hypothesis of a sample is optimised locally where it comes near the best minimal model so far; the run
 /// ends once samples enough for the inliers of the best optimised model have been drawn. Where samples lead to different
 /// optima, one sample of inliers is not enough: until [`Estimator::DISCOVERIES`] of them have led to the best one (half as
-/// many where most correspondences agree with it and no other optimum came near), five times as many samples are asked for. With an order, ranked and uniform samples alternate: the best ranked ones may lie
-/// close together.
+/// many where most correspondences agree with it and no other optimum came near), five times as many samples are asked
+/// for. With an order, ranked and uniform samples alternate: the best ranked ones may lie close together.
 ///
 /// # Input
 /// `order` maps the ranks of ranked sampling to correspondences; without it samples are uniform. `least_inliers` is

@@ -31,7 +31,7 @@ const MAX_REFINEMENTS: usize = 5;
 /// are admitted: one point hides the other.
 ///
 /// # Accuracy
-/// Noise-free, any pose, depth 2 to 20: `f64` 100 % within 1e-6 rad (99th percentile 1e-13); `f32` 99.9 %
+/// Noise-free, any pose, depth 2 to 20: `f64` 100 % within 1e-6 rad (99th percentile 1e-13); `f32` 99.75 to 100 %
 /// within 1e-3 rad, where an exact solver of the rounded input reaches 99.99 %.
 ///
 /// # Cost

@@ -145,7 +145,7 @@ impl<T: Real, B: EpipolarBlock<T>, K: Minimal<T, S>, const S: usize> Estimator<T
 {
     type Model = PoseModel<T>;
 
-    // A polished model lies where its optimum does.
+    // A polished model lies where its optimum does: one near miss in 32 iterations is enough.
     const NEAR_MISSES: u32 = 0;
     // The subset is looked at three times before.
     const SCORE_PASSES: u32 = 4;
