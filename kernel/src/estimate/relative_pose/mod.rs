@@ -123,8 +123,8 @@ pub type RelativePoseError = TwoViewError;
 /// At most `max_iterations` samples, by itself as many as the confidence needs for the inliers found; beyond a budget of
 /// residuals at most one refinement (five passes over 256 correspondences at the most, one score of all, and seven passes
 /// over 64 to try a rotation; with a prior six passes over all), and the verdict's passes. A budget of fewer than n
-/// residuals, of 4 n with a prior, scores nothing. At half outliers a prior takes less than a third of the samples and of the time; a contradicted one costs its own search, of as many samples as a
-/// fifth of inliers needs, and one more verdict.
+/// residuals, of 4 n with a prior, scores nothing. At half outliers a prior takes less than a third of the samples; a
+/// contradicted one costs its own search, of as many samples as a fifth of inliers needs, and one more verdict.
 ///
 /// # References
 /// D. Nister, "An efficient solution to the five-point relative pose problem", TPAMI 2004 (the minimal problem);
