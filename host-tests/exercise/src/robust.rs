@@ -133,8 +133,8 @@ pub(crate) fn engine<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
     sink.flag(location.settles(&source.scalar(), &mut 0));
     sink.numbers(location.polish(&source.scalar(), T::MAX, &mut ScoreCounts::default()).iter());
     let consensus = ransac(&location, &options, None, 3, Some(&mut keep_going));
-    for (model, score) in consensus.models.iter().flatten() {
-        sink.number(*model);
+    if let Some((model, score)) = consensus.best {
+        sink.number(model);
         sink.number(score.cost);
     }
     sink.count(consensus.report.inliers as usize);

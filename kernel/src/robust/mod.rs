@@ -16,7 +16,7 @@ mod stopping;
 pub use budget::{Budget, Guide, OptionsError, Progress, RansacOptions, RansacReport, StopReason};
 pub use estimator::{Estimator, ScoreCounts};
 pub use rank::rank_by_score;
-pub use ransac::{Consensus, KEPT, ransac};
+pub use ransac::{Consensus, ransac};
 pub use sampler::Sampler;
 pub use score::{Gate, Score, Tally};
 pub use stopping::{

@@ -8,9 +8,6 @@ use super::stopping::{iterations_needed, miss_probability, undetected_inlier_rat
 use crate::Real;
 use crate::real::{abs, from_u32, lit, max, min};
 
-/// How many locally optimised models a run keeps, best first.
-pub const KEPT: usize = 4;
-
 /// A sample's best hypothesis is optimised where it explains this share of what the best minimal model does: the
 /// best minimal model need not lie in the best basin.
 const SLACK: f64 = 0.7;
@@ -24,12 +21,12 @@ const SAME_OPTIMUM: f64 = 0.003;
 /// Another optimum is a rival where what it explains less than the best is smaller than this share.
 const RIVAL: f64 = 0.05;
 
-/// What a run found: models after local optimisation, best first, and how it went.
+/// What a run found, and how it went.
 #[derive(Clone, Copy, Debug)]
 #[must_use]
 pub struct Consensus<M, T> {
-    /// The best model and the runners-up of other samples (often the same optimum again).
-    pub models: [Option<(M, Score<T>)>; KEPT],
+    /// The best model after local optimisation.
+    pub best: Option<(M, Score<T>)>,
     /// How the run went.
     pub report: RansacReport<T>,
 }
@@ -48,12 +45,12 @@ pub struct Consensus<M, T> {
 /// asked before every [`Guide::INTERVAL`]-th iteration. Options are taken as they are: [`RansacOptions::check`] them.
 ///
 /// # Returns
-/// Up to [`KEPT`] models, best first, and the report. No model where every sample was degenerate, every hypothesis was
+/// The best model, and the report. No model where every sample was degenerate, every hypothesis was
 /// rejected, or there are fewer correspondences than a sample takes.
 ///
 /// # Cost
 /// At most the budget; one local optimisation, begun within the budget of residuals, may end beyond it.
-/// Memory: the models alone, on the stack.
+/// Memory: three models on the stack.
 ///
 /// # References
 /// M. Fischler, R. Bolles, "Random sample consensus", Communications of the ACM 24, 1981.
@@ -102,7 +99,7 @@ pub struct Consensus<M, T> {
 ///     (x, if i % 3 == 0 { 7.0 - x * x } else { 1.0 + 0.5 * x })
 /// });
 /// let consensus = ransac(&Points(&points), &RansacOptions::default(), None, 2, None);
-/// let ((a, b), score) = consensus.models[0].unwrap();
+/// let ((a, b), score) = consensus.best.unwrap();
 /// assert!((a - 1.0).abs() < 1e-5 && (b - 0.5).abs() < 1e-5 && score.inliers == 8);
 /// ```
 pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
@@ -120,7 +117,7 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
         score_passes: E::SCORE_PASSES,
     };
     let mut search = Search::new(options, order, count, size, least_inliers, manners);
-    let mut models: [Option<(E::Model, Score<T>)>; KEPT] = [None; KEPT];
+    let mut best: Option<(E::Model, Score<T>)> = None;
     let mut sample = [0; S];
     while search.next(&mut sample, &mut keep_going) {
         let bound = search.bound();
@@ -154,13 +151,15 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
             }
             search.add_up();
         }
-        let best = models[0].map(|(_, score)| score);
-        let leads = best.is_none_or(|best| candidate.1.cost < best.cost);
-        if leads && estimator.reject(&candidate.0) {
-            continue;
+        let former = best.map(|(_, score)| score);
+        let leads = former.is_none_or(|former| candidate.1.cost < former.cost);
+        if leads {
+            if estimator.reject(&candidate.0) {
+                continue;
+            }
+            best = Some(candidate);
         }
-        keep(&mut models, candidate);
-        search.has_kept(&candidate.1, best.as_ref());
+        search.has_found(&candidate.1, former.as_ref());
         if leads && search.discoveries < search.wanted() {
             if estimator.settles(&candidate.0, &mut search.refined_residuals) {
                 search.discoveries = E::DISCOVERIES;
@@ -168,7 +167,7 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
             search.add_up();
         }
     }
-    Consensus { models, report: search.report(models[0].map(|(_, score)| score)) }
+    Consensus { best, report: search.report(best.map(|(_, score)| score)) }
 }
 
 /// An estimator's constants.
@@ -179,7 +178,7 @@ struct Manners {
     score_passes: u32,
 }
 
-/// What a run keeps beside its models: the same code for every estimator.
+/// What a run keeps beside its model: the same code for every estimator.
 struct Search<'a, T> {
     options: &'a RansacOptions<T>,
     order: Option<&'a [u32]>,
@@ -321,8 +320,8 @@ impl<'a, T: Real> Search<'a, T> {
         self.spent.residuals = self.counts.residuals + self.refined_residuals;
     }
 
-    /// After another model has been kept beside the best one so far.
-    fn has_kept(&mut self, score: &Score<T>, best: Option<&Score<T>>) {
+    /// After another optimum has been found; `best` is the best one before.
+    fn has_found(&mut self, score: &Score<T>, best: Option<&Score<T>>) {
         let all = from_u32::<T>(self.count);
         let mut same = all * lit(SAME_OPTIMUM);
         if self.most_agree() {
@@ -372,15 +371,4 @@ fn gate<T: Real>(bound: T, inliers: u32, count: u32, counts: &ScoreCounts) -> Ga
         min(ratio(share(counts.rejected_inliers), share(counts.rejected_residuals)), lit(0.5))
     };
     Gate::new(bound, ratio(inliers, core::cmp::max(count, 1)), max(bad, lit(0.01)))
-}
-
-/// Inserts a model by its cost; the worst falls off.
-fn keep<M: Copy, T: Real>(models: &mut [Option<(M, Score<T>)>; KEPT], candidate: (M, Score<T>)) {
-    let mut moving = Some(candidate);
-    for place in models {
-        let Some((_, score)) = &moving else { return };
-        if place.is_none_or(|(_, kept)| score.cost < kept.cost) {
-            core::mem::swap(place, &mut moving);
-        }
-    }
 }

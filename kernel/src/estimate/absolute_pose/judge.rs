@@ -93,7 +93,7 @@ fn judged<T: Real, B: ReprojectionBlock<T>>(
         noise_px: T::ZERO,
         report: consensus.report,
     };
-    let found = consensus.models[0].map(|(model, _)| model);
+    let found = consensus.best.map(|(model, _)| model);
     let believed = found.filter(|_| beyond_chance(task, problem, consensus));
     // Points behind the camera show a depth-reversed shape that a part of them fits in front, too.
     let few = 2 * consensus.report.inliers < count as u32;

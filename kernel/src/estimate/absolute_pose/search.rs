@@ -50,7 +50,7 @@ pub(super) fn aided_search<T: Real, B: ReprojectionBlock<T>>(
     mut keep_going: Option<&mut dyn FnMut(&Progress) -> bool>,
 ) -> (Consensus<CameraPose<T>, T>, Option<PriorFit<T>>) {
     let deviations_of = |consensus: &Consensus<CameraPose<T>, T>| {
-        consensus.models[0].map_or(T::MAX, |(model, _)| gravity.deviation(&model))
+        consensus.best.map_or(T::MAX, |(model, _)| gravity.deviation(&model))
     };
     let limit = lit(PRIOR_SIGMAS);
     let upright_frame = |v: &Vector3<T>| upright(v).unwrap_or_else(Matrix3::identity);
@@ -73,5 +73,5 @@ pub(super) fn aided_search<T: Real, B: ReprojectionBlock<T>>(
     let deviations = deviations_of(&chosen);
     let fit =
         if deviations < limit { PriorFit::Fits(deviations) } else { PriorFit::Contradicted(deviations) };
-    (chosen, chosen.models[0].map(|_| fit))
+    (chosen, chosen.best.map(|_| fit))
 }

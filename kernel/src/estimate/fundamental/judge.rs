@@ -157,7 +157,7 @@ impl<T: Real> Judge<'_, '_, T> {
         let problem = TransferProblem { data: self.problem.data, threshold, subset: Some(inliers) };
         let budget = Budget { max_iterations: 60, ..Budget::default() };
         let options = RansacOptions { seed: self.seed, confidence: lit(0.99), min_iterations: 10, budget };
-        let (model, _) = ransac(&problem, &options, None, 8, None).models[0]?;
+        let (model, _) = ransac(&problem, &options, None, 8, None).best?;
         HomographyModel::new(&problem.optimise(&model, &Loss::Truncated(threshold), 8, lit(1e-6)).model.0)
     }
 
@@ -166,7 +166,7 @@ impl<T: Real> Judge<'_, '_, T> {
         let problem = ParallaxProblem { problem: self.problem, homography: &plane.0, off };
         let budget = Budget { max_iterations: 500, ..Budget::default() };
         let options = RansacOptions { seed: self.seed, confidence: lit(0.999), min_iterations: 20, budget };
-        ransac(&problem, &options, None, 2, None).models[0].map(|(model, _)| model)
+        ransac(&problem, &options, None, 2, None).best.map(|(model, _)| model)
     }
 
     /// How a plane divides the correspondences; those outside are listed in `order`.

@@ -191,7 +191,7 @@ pub fn homography_guided<T: Real>(
     let mut report = consensus.report;
     let judge = Judge { problem: &problem, sigma: sigma_px / frame.pixels, frame: &frame };
     let mask = workspace.inliers.get_mut(..count).unwrap_or_default();
-    let (verdict, noise) = match &consensus.models[0] {
+    let (verdict, noise) = match &consensus.best {
         Some((model, _)) => judge.verdict(model, mask, workspace.order),
         None => (judge.without_model(mask, workspace.order), T::ZERO),
     };

@@ -73,7 +73,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         mask: &mut [bool],
         order: &mut [u32],
     ) -> Judgement<T> {
-        match &consensus.models[0] {
+        match &consensus.best {
             Some((model, _)) => self.verdict(model, mask, order),
             None => {
                 mask.iter_mut().for_each(|inlier| *inlier = false);
@@ -92,7 +92,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         }
     }
 
-    /// The verdict on a pose and its runners-up; writes the inlier mask, and uses `order` as memory.
+    /// The verdict on a pose; writes the inlier mask, and uses `order` as memory.
     fn verdict(&self, best: &PoseModel<T>, mask: &mut [bool], order: &mut [u32]) -> Judgement<T> {
         let problem = self.problem;
         let count = problem.data.count as u32;
