@@ -130,8 +130,8 @@ impl<T: Real> Sums<T> {
 
 /// The normal equations of all nine entries of `H`.
 struct EntryEquations<T> {
-    /// `J' W J`: rows and columns of H, of either side.
-    products: [[[[T; 3]; 3]; 3]; 3],
+    /// `J' W J`: pairs of rows and pairs of columns of H, as [`symmetric`] has them.
+    products: [[T; 6]; 6],
     /// `J' W r`.
     slopes: [[T; 3]; 3],
     cost: T,
@@ -176,7 +176,7 @@ fn entry_equations<T: Real, B: EpipolarBlock<T>>(
         sums.add(h, &pending, &pending_weights, loss, filled);
     }
     let total = |lanes: &Lanes<T>| (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
-    let products = symmetric(sums.products.each_ref().map(|row| symmetric(row.each_ref().map(total))));
+    let products = sums.products.each_ref().map(|row| row.each_ref().map(total));
     let slopes = sums.slopes.each_ref().map(|row| row.each_ref().map(total));
     let outside = (data.count as u32).saturating_sub(active);
     let cost = total(&sums.cost) + crate::real::from_u32::<T>(outside) * beyond;
@@ -194,8 +194,17 @@ where
     B: EpipolarBlock<T>,
     M: Tangents<T, P>,
 {
-    let EntryEquations { products, slopes, cost, active } = entry_equations(data, &model.matrix(), loss);
-    let tangents = model.tangents();
+    along_tangents(&entry_equations(data, &model.matrix(), loss), &model.tangents())
+}
+
+/// The normal equations of a model whose matrix moves along `tangents`. Called where code is to be small: its matrices take
+/// no stack during the pass.
+#[cfg_attr(small, inline(never))]
+fn along_tangents<T: Real, const P: usize>(
+    &EntryEquations { ref products, slopes, cost, active }: &EntryEquations<T>,
+    tangents: &[[T; 9]; P],
+) -> NormalEquations<T, P> {
+    let products = symmetric(products.each_ref().map(|&row| symmetric(row)));
     let mut hessian = SMatrix::<T, P, P>::zeros();
     let mut gradient = SVector::<T, P>::zeros();
     for q in 0..P {

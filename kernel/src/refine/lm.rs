@@ -68,6 +68,18 @@ impl<T: Real, const P: usize> NormalEquations<T, P> {
         Self { hessian: SMatrix::zeros(), gradient: SVector::zeros(), cost: T::ZERO, active: 0 }
     }
 
+    /// The step to the minimum, each diagonal element larger by the share `damping`; none where a direction is open. Called
+    /// where code is to be small: its factors take no stack during a pass.
+    #[cfg_attr(small, inline(never))]
+    fn step(&self, damping: T) -> Option<SVector<T, P>> {
+        let mut damped = self.hessian;
+        for p in 0..P {
+            let diagonal = damped.data.0[p][p];
+            damped.data.0[p][p] = diagonal + damping * diagonal;
+        }
+        Ldlt::new(&damped).map(|factors| -factors.solve(&self.gradient))
+    }
+
     /// Adds those of other correspondences.
     pub(crate) fn accumulate(&mut self, other: &Self) {
         self.hessian += other.hessian;
@@ -286,17 +298,11 @@ where
         if best.equations.active < least_active {
             break;
         }
-        let mut damped = best.equations.hessian;
-        for p in 0..P {
-            let diagonal = damped.data.0[p][p];
-            damped.data.0[p][p] = diagonal + damping * diagonal;
-        }
-        let Some(factors) = Ldlt::new(&damped) else {
+        let Some(step) = best.equations.step(damping) else {
             damping *= lit(100.0);
             best.passes += 1;
             continue;
         };
-        let step = -factors.solve(&best.equations.gradient);
         // What the step promises would not be worth the pass that tells.
         if -step.dot(&best.equations.gradient) <= tolerance * lit(0.1) * best.equations.cost {
             break;

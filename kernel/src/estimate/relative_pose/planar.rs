@@ -62,11 +62,23 @@ pub(super) struct Twin<T: Real> {
 
 impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     /// The plane that holds the most inliers of a pose, refined; none where less than half of them may lie on one.
-    ///
-    /// Once a pose is known, inverse depths are linear in the image on a plane: three correspondences fix it, whether or not
-    /// the pose is the right one of the two that a plane leaves open.
     pub(super) fn plane(&self, pose: &PoseModel<T>, inliers: &[u32], sigma: T) -> Option<HomographyModel<T>> {
         let threshold = sigma * lit(PLANE_SIGMAS);
+        let plane = self.plane_of_three(pose, inliers, threshold)?;
+        let h = pose.scales.transfer(&(pose.rotation + pose.translation * plane.transpose()));
+        let problem = self.transfer_problem(threshold);
+        let loss = Loss::Tukey(threshold * T::TWO);
+        let start = HomographyModel::new(&h)?;
+        HomographyModel::new(&problem.optimise(&start, &loss, PLANE_PASSES, lit(1e-6)).model.0)
+    }
+
+    /// The plane `p' X1 = 1` that holds the most of some inliers of a pose, fitted to those near the best one of three.
+    ///
+    /// Once a pose is known, inverse depths are linear in the image on a plane: three correspondences fix it, whether or not
+    /// the pose is the right one of the two that a plane leaves open. Not inlined: its list takes no stack while the plane
+    /// is refined.
+    #[inline(never)]
+    fn plane_of_three(&self, pose: &PoseModel<T>, inliers: &[u32], threshold: T) -> Option<Vector3<T>> {
         let mut entries = [InverseDepth { ray: Vector3::zeros(), value: T::ZERO, weight: T::ZERO }; ENTRIES];
         let used = core::cmp::min(inliers.len(), ENTRIES);
         // k len / used, without a product that 32 bits do not hold.
@@ -108,11 +120,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         if held * HELD[1] < used * HELD[0] {
             return None;
         }
-        let h = pose.scales.transfer(&(pose.rotation + pose.translation * plane.transpose()));
-        let problem = self.transfer_problem(threshold);
-        let loss = Loss::Tukey(threshold * T::TWO);
-        let start = HomographyModel::new(&h)?;
-        HomographyModel::new(&problem.optimise(&start, &loss, PLANE_PASSES, lit(1e-6)).model.0)
+        Some(plane)
     }
 
     /// The inverse depth of a correspondence in view 1 under a pose, in baselines; none where it is not finite.
