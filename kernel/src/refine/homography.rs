@@ -3,14 +3,14 @@
 //! The squared error is Sampson's: `e' (I + J J')^-1 e` with `e` the transfer error in view 2 and `J` the Jacobian of
 //! the transferred point by the point of view 1, so that noise in both views counts.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, SVector, Vector3};
 
 use super::blocks::{Block, BlockSlice, EpipolarBlock, PlaneBlock};
 use super::lm::{Manifold, NormalEquations, Tangents};
 use super::relative_pose::{Scales, cayley};
 use crate::Real;
 use crate::linalg::{LANES, Lanes};
-use crate::real::{abs, sqrt};
+use crate::real::{abs, from_u32, sqrt};
 use crate::robust::loss::Loss;
 
 /// One transferred point.
@@ -75,6 +75,13 @@ struct Sums<T> {
 }
 
 impl<T: Real> Sums<T> {
+    /// Of no correspondences: a constant, so that it is made in place.
+    const ZERO: Self = Self {
+        products: [[[T::ZERO; LANES]; 6]; 6],
+        slopes: [[[T::ZERO; LANES]; 3]; 3],
+        cost: [T::ZERO; LANES],
+    };
+
     /// Adds the lanes of a block of which the first `filled` count.
     #[cfg_attr(not(small), inline(always))]
     fn add(
@@ -138,6 +145,11 @@ struct EntryEquations<T> {
     active: u32,
 }
 
+impl<T: Real> EntryEquations<T> {
+    const ZERO: Self =
+        Self { products: [[T::ZERO; 6]; 6], slopes: [[T::ZERO; 3]; 3], cost: T::ZERO, active: 0 };
+}
+
 /// One pass over all correspondences for `x2 ~ H x1`. Those beyond the loss's support are left out; the others are packed
 /// into full blocks first, so that the derivatives are computed for them alone.
 fn entry_equations<T: Real, B: EpipolarBlock<T>>(
@@ -145,12 +157,11 @@ fn entry_equations<T: Real, B: EpipolarBlock<T>>(
     h: &Matrix3<T>,
     loss: &Loss<T>,
 ) -> EntryEquations<T> {
-    let zero = [T::ZERO; LANES];
-    let mut sums = Sums { products: [[zero; 6]; 6], slopes: [[zero; 3]; 3], cost: zero };
+    let mut sums = Sums::<T>::ZERO;
     let support = loss.support().unwrap_or(T::MAX);
     let beyond = if support < T::MAX { loss.evaluate(support).0 } else { T::ZERO };
     let mut active = 0u32;
-    let (mut pending, mut pending_weights) = (PlaneBlock::zero(), zero);
+    let (mut pending, mut pending_weights) = (PlaneBlock::zero(), [T::ZERO; LANES]);
     let mut filled = 0usize;
     let mut left = data.count;
     for block in data.blocks {
@@ -176,14 +187,21 @@ fn entry_equations<T: Real, B: EpipolarBlock<T>>(
         sums.add(h, &pending, &pending_weights, loss, filled);
     }
     let total = |lanes: &Lanes<T>| (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
-    let products = sums.products.each_ref().map(|row| row.each_ref().map(total));
-    let slopes = sums.slopes.each_ref().map(|row| row.each_ref().map(total));
+    let mut result = EntryEquations::ZERO;
+    for (entry, lanes) in result.products.as_flattened_mut().iter_mut().zip(sums.products.as_flattened()) {
+        *entry = total(lanes);
+    }
+    for (entry, lanes) in result.slopes.as_flattened_mut().iter_mut().zip(sums.slopes.as_flattened()) {
+        *entry = total(lanes);
+    }
     let outside = (data.count as u32).saturating_sub(active);
-    let cost = total(&sums.cost) + crate::real::from_u32::<T>(outside) * beyond;
-    EntryEquations { products, slopes, cost, active }
+    result.cost = total(&sums.cost) + from_u32::<T>(outside) * beyond;
+    result.active = active;
+    result
 }
 
 /// The normal equations of a model of `x2 ~ H x1`.
+#[cfg_attr(small, inline(never))]
 pub(crate) fn transfer_equations<T, B, M, const P: usize>(
     data: BlockSlice<'_, B>,
     model: &M,
@@ -194,49 +212,55 @@ where
     B: EpipolarBlock<T>,
     M: Tangents<T, P>,
 {
-    along_tangents(&entry_equations(data, &model.matrix(), loss), &model.tangents())
+    let entries = entry_equations(data, &model.matrix(), loss);
+    let mut sums = NormalEquations { cost: entries.cost, active: entries.active, ..NormalEquations::zero() };
+    let NormalEquations { hessian, gradient, .. } = &mut sums;
+    along_tangents(
+        &entries,
+        &model.tangents(),
+        hessian.data.0.as_flattened_mut(),
+        gradient.data.0.as_flattened_mut(),
+    );
+    sums
 }
 
-/// The normal equations of a model whose matrix moves along `tangents`. Called where code is to be small: its matrices take
-/// no stack during the pass.
+/// The normal equations of a model whose matrix moves along `tangents`: hessian, column by column, and gradient. Where code
+/// is to be small one function serves all models, and its numbers take no stack during the pass.
+#[cfg_attr(not(small), inline(always))]
 #[cfg_attr(small, inline(never))]
-fn along_tangents<T: Real, const P: usize>(
-    &EntryEquations { ref products, slopes, cost, active }: &EntryEquations<T>,
-    tangents: &[[T; 9]; P],
-) -> NormalEquations<T, P> {
-    let products = symmetric(products.each_ref().map(|&row| symmetric(row)));
-    let mut hessian = SMatrix::<T, P, P>::zeros();
-    let mut gradient = SVector::<T, P>::zeros();
-    for q in 0..P {
+fn along_tangents<T: Real>(
+    entries: &EntryEquations<T>,
+    tangents: &[[T; 9]],
+    hessian: &mut [T],
+    gradient: &mut [T],
+) {
+    let products = symmetric(entries.products.map(symmetric));
+    for (q, (tangent, slope)) in tangents.iter().zip(gradient).enumerate() {
         let mut image = [T::ZERO; 9];
         for i in 0..3 {
             for j in 0..3 {
                 let mut sum = T::ZERO;
                 for k in 0..3 {
                     for m in 0..3 {
-                        sum += products[i][k][j][m] * tangents[q][3 * k + m];
+                        sum += products[i][k][j][m] * tangent[3 * k + m];
                     }
                 }
                 image[3 * i + j] = sum;
+                *slope += entries.slopes[i][j] * tangent[3 * i + j];
             }
         }
-        for p in 0..=q {
+        for (p, other) in tangents.iter().enumerate().take(q + 1) {
             let mut sum = T::ZERO;
             for k in 0..9 {
-                sum += tangents[p][k] * image[k];
+                sum += other[k] * image[k];
             }
-            hessian.data.0[q][p] = sum;
-            hessian.data.0[p][q] = sum;
-        }
-        let mut sum = T::ZERO;
-        for i in 0..3 {
-            for j in 0..3 {
-                sum += slopes[i][j] * tangents[q][3 * i + j];
+            for place in [q * tangents.len() + p, p * tangents.len() + q] {
+                if let Some(entry) = hessian.get_mut(place) {
+                    *entry = sum;
+                }
             }
         }
-        gradient.data.0[0][q] = sum;
     }
-    NormalEquations { hessian, gradient, cost, active }
 }
 
 /// A homography with |H| = 1 and positive determinant.

@@ -96,6 +96,10 @@ struct Sums<T, const P: usize> {
 }
 
 impl<T: Real, const P: usize> Sums<T, P> {
+    /// Of no correspondences: a constant, so that it is made in place.
+    const ZERO: Self =
+        Self { hessian: [[[T::ZERO; LANES]; P]; P], gradient: [[T::ZERO; LANES]; P], cost: [T::ZERO; LANES] };
+
     /// Adds the lanes of a block of which the first `filled` count.
     #[cfg_attr(not(small), inline(always))]
     fn add(&mut self, rows: &Rows<T, P>, loss: &Loss<T>, filled: usize) {
@@ -181,8 +185,7 @@ where
 {
     let step = core::cmp::max(step, 1);
     let (f, frame) = (model.matrix(), model.frame());
-    let zero = [T::ZERO; LANES];
-    let mut sums = Sums { hessian: [[zero; P]; P], gradient: [zero; P], cost: zero };
+    let mut sums = Sums::<T, P>::ZERO;
     let support = loss.support();
     let limit = support.unwrap_or(T::MAX);
     let (mut active, mut seen) = (0u32, 0usize);
@@ -234,20 +237,20 @@ where
             sums.add(&M::rows(&frame, current), loss, lanes);
         }
     }
-    let mut hessian = SMatrix::<T, P, P>::zeros();
-    let mut gradient = SVector::<T, P>::zeros();
+    let mut equations = NormalEquations::zero();
     for p in 0..P {
-        gradient.data.0[0][p] = total(&sums.gradient[p]);
+        equations.gradient.data.0[0][p] = total(&sums.gradient[p]);
         for q in 0..P {
             let (a, b) = if q <= p { (p, q) } else { (q, p) };
-            hessian.data.0[q][p] = total(&sums.hessian[a][b]);
+            equations.hessian.data.0[q][p] = total(&sums.hessian[a][b]);
         }
     }
     let outside = from_u32::<T>((seen as u32).saturating_sub(active));
     let beyond = support.map_or(T::ZERO, |limit| loss.evaluate(limit).0);
-    let mut sums = NormalEquations { hessian, gradient, cost: total(&sums.cost) + outside * beyond, active };
-    M::turn_back(&frame, &mut sums);
-    sums
+    equations.cost = total(&sums.cost) + outside * beyond;
+    equations.active = active;
+    M::turn_back(&frame, &mut equations);
+    equations
 }
 
 /// How a minimisation ended.

@@ -180,8 +180,9 @@ impl<T: Real> EpipolarModel<T, 5> for PoseModel<T> {
     /// By a rotation of the frame, and by the translation along its first two axes:
     /// `sqrt(d) dr = p (dE y) - x (dE z)` with `p = x - a`, where `dE y = e3 x (w x y)` or `e_k x y`.
     #[cfg_attr(not(small), inline(always))]
+    #[cfg_attr(small, inline(never))]
     fn rows<B: EpipolarBlock<T>>(frame: &PoseFrame<T>, block: &B) -> Rows<T, 5> {
-        let InFrame { y, x, c, inverse, z, a } = block.in_frame(&frame.views);
+        let InFrame { y, x, c, inverse, z, a } = &block.in_frame(&frame.views);
         let mut j = [[T::ZERO; LANES]; 5];
         for l in 0..LANES {
             let p = [x[0][l] - a[0][l], x[1][l] - a[1][l], x[2][l] - a[2][l]];
@@ -191,7 +192,7 @@ impl<T: Real> EpipolarModel<T, 5> for PoseModel<T> {
             j[3][l] = (y[1][l] * p[2] - y[2][l] * p[1]) - (z[1][l] * x[2][l] - z[2][l] * x[1][l]);
             j[4][l] = (y[2][l] * p[0] - y[0][l] * p[2]) - (z[2][l] * x[0][l] - z[0][l] * x[2][l]);
         }
-        Rows { c, inverse, j }
+        Rows { c: *c, inverse: *inverse, j }
     }
 
     fn turn_back(frame: &PoseFrame<T>, sums: &mut NormalEquations<T, 5>) {

@@ -219,3 +219,17 @@ pub struct RansacReport<T> {
     /// Without consensus: a larger share of inliers than this would have been sampled, with the confidence asked.
     pub excluded_inlier_ratio: T,
 }
+
+impl<T: Real> RansacReport<T> {
+    /// Of no run.
+    pub(crate) fn none() -> Self {
+        Self {
+            spent: Progress::default(),
+            stop: StopReason::MaxIterations,
+            inliers: 0,
+            cost: T::ZERO,
+            miss_probability: T::ONE,
+            excluded_inlier_ratio: T::ONE,
+        }
+    }
+}

@@ -10,9 +10,9 @@ use super::super::chance::line_accident;
 use super::super::prior::PriorFit;
 use super::LEAST_INLIERS;
 use super::hypothesis::{PoseProblem, repeated};
-use super::judge::{Judge, Judgement, pose_model};
+use super::judge::{Judge, pose_model};
 use super::prior::KnownRotation;
-use super::verdict::RelativePoseVerdict;
+use super::verdict::{RelativePoseEstimate, RelativePoseVerdict};
 use crate::Real;
 use crate::geometry::pose::upright;
 use crate::linalg::LANES;
@@ -231,25 +231,19 @@ fn search<T: Real, B: EpipolarBlock<T>>(
     }
 }
 
-/// A judgement with what was spent for it and what became of the prior.
-pub(super) struct Aided<T: Real> {
-    pub(super) judgement: Judgement<T>,
-    pub(super) report: RansacReport<T>,
-    pub(super) fit: Option<PriorFit<T>>,
-}
-
-/// The judgement with a prior: by smaller samples where that finds a consensus that agrees with the prior, otherwise by
+/// The estimate with a prior: by smaller samples where that finds a consensus that agrees with the prior, otherwise by
 /// the search without it. The prior takes part in the refinement where it fits, and nowhere else. Not inlined: without a
 /// prior its variables take no stack.
 #[inline(never)]
-pub(super) fn judgement<T: Real, B: EpipolarBlock<T>>(
+pub(super) fn judge<T: Real, B: EpipolarBlock<T>>(
     plain: &Judge<'_, '_, T, B>,
     known: &KnownRotation<T>,
     options: &RansacOptions<T>,
     guide: Guide<'_, T>,
     mask: &mut [bool],
     order: &mut [u32],
-) -> Aided<T> {
+    estimate: &mut RelativePoseEstimate<T>,
+) {
     let problem = PoseProblem { prior: Some((known, plain.sigma * plain.sigma)), ..*plain.problem };
     let aided = Judge { problem: &problem, ..*plain };
     let Guide { scores, mut keep_going } = guide;
@@ -260,9 +254,9 @@ pub(super) fn judgement<T: Real, B: EpipolarBlock<T>>(
     let mut interrupted = first.is_some_and(|first| first.report.stop == StopReason::Interrupted);
     let confident = first.filter(|first| first.report.stop == StopReason::Confident);
     if let Some(first) = confident {
-        let judgement = aided.judgement(&first, mask, order);
-        let fit = agreement(plain, known, &judgement);
-        if let Some(PriorFit::Fits(_)) = fit {
+        aided.judge(&first, mask, order, estimate);
+        estimate.prior = agreement(plain, known, &estimate.verdict);
+        if let Some(PriorFit::Fits(_)) = estimate.prior {
             let ask = keep_going.as_mut().map(|ask| &mut **ask as &mut dyn FnMut(&_) -> bool);
             let rival = rival(plain.problem, &first, options, ask);
             let mut report = first.report;
@@ -272,7 +266,8 @@ pub(super) fn judgement<T: Real, B: EpipolarBlock<T>>(
                 report.stop = rival.stop;
             }
             if !(rival.cost < first.report.cost) {
-                return Aided { judgement, report, fit };
+                estimate.report = report;
+                return;
             }
             spent = report.spent;
         }
@@ -293,19 +288,19 @@ pub(super) fn judgement<T: Real, B: EpipolarBlock<T>>(
     if let Some(first) = first
         && first.report.cost < second.report.cost
     {
-        let judgement = aided.judgement(&first, mask, order);
-        let fit = agreement(plain, known, &judgement);
-        if let Some(PriorFit::Fits(_)) = fit {
-            return Aided { judgement, report: total(first.report), fit };
+        aided.judge(&first, mask, order, estimate);
+        estimate.prior = agreement(plain, known, &estimate.verdict);
+        if let Some(PriorFit::Fits(_)) = estimate.prior {
+            estimate.report = total(first.report);
+            return;
         }
     }
-    let judgement = plain.judgement(&second, mask, order);
-    let fit = known.agreement(&judgement.verdict);
-    let judgement = match fit {
-        Some(PriorFit::Fits(_)) => aided.judgement(&second, mask, order),
-        _ => judgement,
-    };
-    Aided { judgement, report: total(second.report), fit }
+    estimate.report = total(second.report);
+    plain.judge(&second, mask, order, estimate);
+    estimate.prior = known.agreement(&estimate.verdict);
+    if let Some(PriorFit::Fits(_)) = estimate.prior {
+        aided.judge(&second, mask, order, estimate);
+    }
 }
 
 /// A short search without the prior for a consensus half as large again: a wrong prior may have led to a pose that a part
@@ -327,13 +322,13 @@ fn rival<T: Real, B: EpipolarBlock<T>>(
     ransac::<T, _, 5>(problem, &options, None, inliers, keep_going).report
 }
 
-/// How the prior agrees with a judgement in which it took part: with what the same correspondences say without it.
+/// How the prior agrees with a verdict in which it took part: with what the same correspondences say without it.
 fn agreement<T: Real, B: EpipolarBlock<T>>(
     plain: &Judge<'_, '_, T, B>,
     known: &KnownRotation<T>,
-    judgement: &Judgement<T>,
+    verdict: &RelativePoseVerdict<T>,
 ) -> Option<PriorFit<T>> {
-    match &judgement.verdict {
+    match verdict {
         RelativePoseVerdict::General(motion) => {
             let model = plain.refine(&pose_model(&motion.pose, plain.problem), UNAIDED_PASSES);
             let (motion, _) = plain.motion(&model, plain.noise(&model));

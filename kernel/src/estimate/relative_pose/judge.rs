@@ -7,7 +7,7 @@ use super::super::degenerate::{few_distinct, list, on_a_line};
 use super::covariance::{PsiSums, covariance, variance};
 use super::evidence::{Evidence, Explained};
 use super::hypothesis::{PoseProblem, SAMPLED_BLOCKS};
-use super::verdict::{GeneralMotion, PureRotation, RelativePoseVerdict, Unobservable};
+use super::verdict::{GeneralMotion, PureRotation, RelativePoseEstimate, RelativePoseVerdict, Unobservable};
 use crate::Real;
 use crate::geometry::Pose;
 use crate::geometry::pose::from_parts;
@@ -30,12 +30,6 @@ pub(super) struct Judge<'a, 'b, T: Real, B> {
     /// Displacement in the blocks' unit up to which a correspondence may stand still.
     pub(super) least_motion: T,
     pub(super) seed: u64,
-}
-
-/// A verdict, with the noise in the blocks' unit.
-pub(super) struct Judgement<T: Real> {
-    pub(super) verdict: RelativePoseVerdict<T>,
-    pub(super) noise: T,
 }
 
 /// Error of an inlier in two dimensions over the threshold: as likely for a true correspondence as the threshold is in
@@ -66,34 +60,43 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         line_accident(self.problem.data, self.problem.threshold)
     }
 
-    /// The judgement on what a search found; writes the inlier mask, and uses `order` as memory.
-    pub(super) fn judgement(
+    /// Writes verdict and noise, in the blocks' unit, of what a search found (in place, for a verdict is large), and the
+    /// inlier mask; uses `order` as memory.
+    pub(super) fn judge(
         &self,
         consensus: &Consensus<PoseModel<T>, T>,
         mask: &mut [bool],
         order: &mut [u32],
-    ) -> Judgement<T> {
+        estimate: &mut RelativePoseEstimate<T>,
+    ) {
+        estimate.noise_px = T::ZERO;
         match &consensus.best {
-            Some((model, _)) => self.verdict(model, mask, order),
+            Some((model, _)) => self.verdict(model, mask, order, estimate),
             None => {
                 mask.iter_mut().for_each(|inlier| *inlier = false);
-                Judgement { verdict: self.without_model(), noise: T::ZERO }
+                self.without_model(estimate);
             }
         }
     }
 
     /// The verdict where no hypothesis was found at all.
-    fn without_model(&self) -> RelativePoseVerdict<T> {
+    fn without_model(&self, estimate: &mut RelativePoseEstimate<T>) {
         let all = 0..self.problem.data.count as u32;
-        if few_distinct(self.problem.data, all, 5, self.sigma, self.accident()) {
+        estimate.verdict = if few_distinct(self.problem.data, all, 5, self.sigma, self.accident()) {
             RelativePoseVerdict::Unobservable(Unobservable::TooFewDistinct)
         } else {
             RelativePoseVerdict::NoConsensus
         }
     }
 
-    /// The verdict on a pose; writes the inlier mask, and uses `order` as memory.
-    fn verdict(&self, best: &PoseModel<T>, mask: &mut [bool], order: &mut [u32]) -> Judgement<T> {
+    /// [`judge`](Self::judge) of a pose.
+    fn verdict(
+        &self,
+        best: &PoseModel<T>,
+        mask: &mut [bool],
+        order: &mut [u32],
+        estimate: &mut RelativePoseEstimate<T>,
+    ) {
         let problem = self.problem;
         let count = problem.data.count as u32;
         let mut refined = self.refine(best, REFINE_PASSES);
@@ -104,36 +107,38 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
             let indices = list(mask, order);
             let line =
                 indices.len() > LEAST_LINE && on_a_line(problem.data, indices, self.sigma, self.accident());
-            let verdict = if line {
-                RelativePoseVerdict::Unobservable(Unobservable::Collinear)
+            if line {
+                estimate.verdict = RelativePoseVerdict::Unobservable(Unobservable::Collinear);
             } else if !beyond_chance(count, count, 5, self.accident()) {
-                RelativePoseVerdict::TooFewInliers
+                estimate.verdict = RelativePoseVerdict::TooFewInliers;
             } else {
-                self.without_model()
-            };
+                self.without_model(estimate);
+            }
             mask.iter_mut().for_each(|inlier| *inlier = false);
-            return Judgement { verdict, noise: T::ZERO };
+            return;
         }
+        estimate.noise_px = noise;
         // Where the options promise less noise than there is, the data are believed.
         let sigma = max(self.sigma, noise);
         let indices = list(mask, order);
         if few_distinct(problem.data, indices.iter().copied(), 5, sigma, accident) {
-            let verdict = RelativePoseVerdict::Unobservable(Unobservable::TooFewDistinct);
-            return Judgement { verdict, noise };
+            estimate.verdict = RelativePoseVerdict::Unobservable(Unobservable::TooFewDistinct);
+            return;
         }
         if on_a_line(problem.data, indices, sigma, accident) {
-            return Judgement { verdict: RelativePoseVerdict::Unobservable(Unobservable::Collinear), noise };
+            estimate.verdict = RelativePoseVerdict::Unobservable(Unobservable::Collinear);
+            return;
         }
         let evidence = Evidence { problem, inliers: mask, epipolar: refined.matrix(), sigma, accident };
         if self.hardly_moves(&evidence) {
             let still = RotationModel { rotation: Matrix3::identity(), scales: problem.scales };
-            return self.turned(&still, true, self.least_motion / lit(EXPLAINED_SIGMAS), mask);
+            return self.turned(&still, true, self.least_motion / lit(EXPLAINED_SIGMAS), mask, estimate);
         }
         if let Some(rotation) = problem.rotation(&refined, sigma, SAMPLED_BLOCKS) {
             let explained = evidence.explained(&rotation.matrix());
             if !evidence.proves_parallax(count, &explained, 3, lit(ROTATION_ACCIDENTS)) {
                 let still = self.stands_still(&evidence, &rotation, &explained);
-                return self.turned(&rotation, still, sigma, mask);
+                return self.turned(&rotation, still, sigma, mask, estimate);
             }
         }
         if let Some(plane) = self.plane(&refined, indices, sigma)
@@ -163,12 +168,13 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                     explained.inliers * 20 >= (explained.inliers + explained.others) * PLANE_SHARE_OF_20;
                 let bends = evidence.bends(&plane.0, &refined.matrix(), max(noise, sigma * T::HALF));
                 if share && !bends && !evidence.proves_parallax(count, &explained, 8, lit(ACCIDENTS)) {
-                    return self.planar(&plane, twins, sigma, mask);
+                    return self.planar(&plane, &twins, sigma, mask, estimate);
                 }
             }
         }
         let (motion, noise) = self.motion(&refined, noise);
-        Judgement { verdict: RelativePoseVerdict::General(motion), noise }
+        estimate.verdict = RelativePoseVerdict::General(motion);
+        estimate.noise_px = noise;
     }
 
     /// The pose that all inliers support, with what lies just beyond the threshold at a falling weight.
@@ -300,7 +306,14 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     }
 
     /// No motion, or a refined rotation.
-    fn turned(&self, rotation: &RotationModel<T>, still: bool, sigma: T, mask: &mut [bool]) -> Judgement<T> {
+    fn turned(
+        &self,
+        rotation: &RotationModel<T>,
+        still: bool,
+        sigma: T,
+        mask: &mut [bool],
+        estimate: &mut RelativePoseEstimate<T>,
+    ) {
         let problem = self.transfer_problem(sigma * lit(EXPLAINED_SIGMAS));
         let model = if still {
             RotationModel { rotation: Matrix3::identity(), scales: rotation.scales }
@@ -313,7 +326,8 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         self.mark_transfer(&minimum.model.matrix(), mask);
         let limit = problem.threshold * problem.threshold;
         let variance = variance(&minimum.equations, problem.data.count, limit, 2);
-        let verdict = if still {
+        estimate.noise_px = sqrt(variance);
+        estimate.verdict = if still {
             RelativePoseVerdict::NoMotion
         } else {
             RelativePoseVerdict::PureRotation(PureRotation {
@@ -321,7 +335,6 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                 covariance: covariance(&minimum.equations, variance),
             })
         };
-        Judgement { verdict, noise: sqrt(variance) }
     }
 
     pub(super) fn transfer_problem(&self, threshold: T) -> TransferProblem<'_, T, B> {

@@ -12,7 +12,7 @@ use crate::real::is_finite;
 use crate::real::lit;
 use crate::refine::blocks::{BearingBlock, BlockSlice, EpipolarBlock, PlaneBlock};
 use crate::robust::budget::check_noise;
-use crate::robust::{Guide, RansacOptions, ransac};
+use crate::robust::{Guide, RansacOptions, RansacReport, ransac};
 use crate::{InputError, Real};
 
 mod aided;
@@ -24,9 +24,9 @@ mod planar;
 mod prior;
 mod verdict;
 
-use aided::{Aided, ranked};
+use aided::ranked;
 use hypothesis::PoseProblem;
-use judge::{Judge, Judgement};
+use judge::Judge;
 use prior::KnownRotation;
 pub use prior::RelativePosePrior;
 pub use verdict::{
@@ -242,14 +242,24 @@ pub fn relative_pose_guided<T: Real>(
     options.ransac.check()?;
     let known = options.known()?;
     let lens = load(camera1, camera2, x1, x2, &guide, workspace)?;
-    Ok(match lens {
-        Lens::Rectilinear(units) => {
-            estimate::<T, PlaneBlock<T>>(units, sigma_px, options, known, guide, workspace)
+    // In place of the result, for a verdict is large.
+    let mut result = Ok(RelativePoseEstimate {
+        verdict: RelativePoseVerdict::NoConsensus,
+        prior: None,
+        noise_px: T::ZERO,
+        report: RansacReport::none(),
+    });
+    if let Ok(found) = &mut result {
+        match lens {
+            Lens::Rectilinear(units) => {
+                estimate::<T, PlaneBlock<T>>(units, sigma_px, options, known, guide, workspace, found);
+            }
+            Lens::Wide(units) => {
+                estimate::<T, BearingBlock<T>>(units, sigma_px, options, known, guide, workspace, found);
+            }
         }
-        Lens::Wide(units) => {
-            estimate::<T, BearingBlock<T>>(units, sigma_px, options, known, guide, workspace)
-        }
-    })
+    }
+    result
 }
 
 /// Into which blocks the correspondences were loaded.
@@ -407,18 +417,19 @@ fn estimate<T: Real, B: EpipolarBlock<T>>(
     known: Option<KnownRotation<T>>,
     guide: Guide<'_, T>,
     workspace: &mut RelativePoseWorkspace<'_, T>,
-) -> RelativePoseEstimate<T> {
+    found: &mut RelativePoseEstimate<T>,
+) {
     match known {
         Some(known) => {
-            judged(units, sigma_px, options, workspace, |judge: &Judge<'_, '_, T, B>, mask, order| {
-                aided::judgement(judge, &known, &options.ransac, guide, mask, order)
+            judged::<T, B>(units, sigma_px, options, workspace, found, |judge, mask, order, found| {
+                aided::judge(judge, &known, &options.ransac, guide, mask, order, found);
             })
         }
-        None => judged(units, sigma_px, options, workspace, |judge: &Judge<'_, '_, T, B>, mask, order| {
+        None => judged::<T, B>(units, sigma_px, options, workspace, found, |judge, mask, order, found| {
             let ranked = ranked(guide.scores, order, mask.len());
             let consensus = ransac(judge.problem, &options.ransac, ranked, LEAST_INLIERS, guide.keep_going);
-            let judgement = judge.judgement(&consensus, mask, order);
-            Aided { judgement, report: consensus.report, fit: None }
+            found.report = consensus.report;
+            judge.judge(&consensus, mask, order, found);
         }),
     }
 }
@@ -430,8 +441,9 @@ fn judged<T: Real, B: EpipolarBlock<T>>(
     sigma_px: T,
     options: &RelativePoseOptions<T>,
     workspace: &mut RelativePoseWorkspace<'_, T>,
-    judgement: impl FnOnce(&Judge<'_, '_, T, B>, &mut [bool], &mut [u32]) -> Aided<T>,
-) -> RelativePoseEstimate<T> {
+    found: &mut RelativePoseEstimate<T>,
+    search: impl FnOnce(&Judge<'_, '_, T, B>, &mut [bool], &mut [u32], &mut RelativePoseEstimate<T>),
+) {
     let count = workspace.count;
     let blocks = B::slice(workspace.numbers);
     let blocks = blocks.get(..count.div_ceil(LANES)).unwrap_or(blocks);
@@ -444,8 +456,7 @@ fn judged<T: Real, B: EpipolarBlock<T>>(
         seed: options.ransac.seed,
     };
     let mask = workspace.inliers.get_mut(..count).unwrap_or_default();
-    let Aided { judgement, mut report, fit } = judgement(&judge, mask, workspace.order);
-    let Judgement { verdict, noise } = judgement;
-    report.inliers = mask.iter().map(|&inlier| inlier as u32).sum();
-    RelativePoseEstimate { verdict, prior: fit, noise_px: noise * units.pixels, report }
+    search(&judge, mask, workspace.order, found);
+    found.report.inliers = mask.iter().map(|&inlier| inlier as u32).sum();
+    found.noise_px *= units.pixels;
 }

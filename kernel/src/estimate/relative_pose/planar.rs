@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::super::scatter::Scatter;
 use super::covariance::planar_covariance;
-use super::judge::{Judge, Judgement, pose_model};
-use super::verdict::{PlanarPose, RelativePoseVerdict};
+use super::judge::{Judge, pose_model};
+use super::verdict::{PlanarPose, RelativePoseEstimate, RelativePoseVerdict};
 use crate::geometry::{Homography, Pose};
 use crate::linalg::{LANES, Ldlt};
 use crate::real::{from_u32, is_finite, lit, max, sqrt};
@@ -196,16 +196,20 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     pub(super) fn planar(
         &self,
         plane: &HomographyModel<T>,
-        twins: Solutions<Twin<T>, 2>,
+        twins: &Solutions<Twin<T>, 2>,
         sigma: T,
         mask: &mut [bool],
-    ) -> Judgement<T> {
+        estimate: &mut RelativePoseEstimate<T>,
+    ) {
         let support = sigma * lit(PLANE_SIGMAS) * T::TWO;
         let problem = self.transfer_problem(support);
         let sums = problem.optimise(plane, &Loss::Tukey(support), 1, T::ZERO).equations;
         let scatter = Scatter::new(problem.data, plane, support);
-        let mut poses = Solutions::new();
-        for &Twin { pose, normal, ratio, .. } in &twins {
+        self.mark_transfer(&plane.0, mask);
+        estimate.noise_px = sqrt(scatter.variance());
+        estimate.verdict = RelativePoseVerdict::Planar(Solutions::new());
+        let RelativePoseVerdict::Planar(poses) = &mut estimate.verdict else { return };
+        for &Twin { pose, normal, ratio, .. } in twins {
             let rotation = pose.rotation.to_rotation_matrix().into_inner();
             let t = pose.translation.vector * ratio;
             let scales = &self.problem.scales;
@@ -214,7 +218,5 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                 .and_then(|factor| planar_covariance(&rotation, &t, &normal, plane, &sums, scales, factor));
             poses.push(PlanarPose { pose, normal, baseline_over_distance: ratio, covariance });
         }
-        self.mark_transfer(&plane.0, mask);
-        Judgement { verdict: RelativePoseVerdict::Planar(poses), noise: sqrt(scatter.variance()) }
     }
 }
