@@ -4,7 +4,7 @@
 //! `d = (F x1)' M2 (F x1) + (F' x2)' M1 (F' x2)`, where `M = J J'` is the metric of a view: `J` is the Jacobian of the
 //! homogeneous point or bearing by the pixel. On a plane with pixels of unit scale `M = diag(1, 1, 0)`.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 
 use crate::Real;
 use crate::linalg::{LANES, Lanes};
@@ -75,10 +75,13 @@ pub(crate) trait EpipolarBlock<T: Real>: Block<T> {
     fn residual(&self, f: &Matrix3<T>) -> (Lanes<T>, Lanes<T>);
 
     /// `c`, `1 / d` and `sqrt(d)` times the gradient of `r` by the entries of `f`, row by row.
-    fn gradient(&self, f: &Matrix3<T>) -> (Lanes<T>, Lanes<T>, [Lanes<T>; 9]);
+    fn gradient(&self, f: &Matrix3<T>, lane: usize) -> (T, T, [T; 9]);
 
-    /// The epipolar geometry in a frame along the translation.
-    fn in_frame(&self, frame: &Frame<T>) -> InFrame<T>;
+    /// A correspondence in a frame along the translation.
+    fn sight(&self, frame: &Frame<T>, lane: usize) -> Sight<T>;
+
+    /// The same with what derivatives of the residual need.
+    fn in_frame(&self, frame: &Frame<T>, lane: usize) -> InFrame<T>;
 
     /// The points on the plane z = 1, and by how much squared distances there are to be multiplied: 1 on a plane; for
     /// bearings what makes distances angles, NaN where a bearing does not meet the plane.
@@ -100,28 +103,51 @@ pub(crate) struct Frame<T: Real> {
     pub(crate) view2: Matrix3<T>,
 }
 
-/// Correspondences in a [`Frame`].
+/// A correspondence in a [`Frame`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sight<T> {
+    /// The point of view 1.
+    pub(crate) y: [T; 3],
+    /// The point of view 2.
+    pub(crate) x: [T; 3],
+    /// `c`.
+    pub(crate) c: T,
+    /// `d`.
+    pub(crate) d: T,
+}
+
+impl<T: Real> Sight<T> {
+    /// Whether the point lies in front of both cameras, or its rays are parallel to within noise, so that its depth says
+    /// nothing: `parallel_sq` is the squared sine up to which they are.
+    #[inline(always)]
+    pub(crate) fn in_front(&self, parallel_sq: T) -> bool {
+        let ([y0, y1, y2], [x0, x1, x2]) = (self.y, self.x);
+        // d1 y + e3 = d2 x, in the least-squares sense: both depths times |y x x|^2.
+        let (yy, xx, xy) = (y0 * y0 + y1 * y1, x0 * x0 + x1 * x1, x0 * y0 + x1 * y1);
+        let (depth1, depth2) = (xy * x2 - xx * y2, yy * x2 - xy * y2);
+        if depth1 > T::ZERO && depth2 > T::ZERO {
+            return true;
+        }
+        let (aa, bb, ab) = (yy + y2 * y2, xx + x2 * x2, xy + x2 * y2);
+        aa * bb - ab * ab <= parallel_sq * aa * bb && ab > T::ZERO
+    }
+}
+
+/// A correspondence in a [`Frame`], and how its residual moves.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct InFrame<T> {
     /// The point of view 1.
-    pub(crate) y: [Lanes<T>; 3],
+    pub(crate) y: [T; 3],
     /// The point of view 2.
-    pub(crate) x: [Lanes<T>; 3],
+    pub(crate) x: [T; 3],
     /// `c`.
-    pub(crate) c: Lanes<T>,
+    pub(crate) c: T,
     /// `1 / d`; zero where a point lies on both epipoles, which has no residual and no direction to move.
-    pub(crate) inverse: Lanes<T>,
+    pub(crate) inverse: T,
     /// `c / d` times the metric's product with the epipolar line of view 1, as a point of view 1.
-    pub(crate) z: [Lanes<T>; 3],
+    pub(crate) z: [T; 3],
     /// The same of view 2.
-    pub(crate) a: [Lanes<T>; 3],
-}
-
-impl<T: Real> InFrame<T> {
-    fn zero() -> Self {
-        let zero = [T::ZERO; LANES];
-        Self { y: [zero; 3], x: [zero; 3], c: zero, inverse: zero, z: [zero; 3], a: [zero; 3] }
-    }
+    pub(crate) a: [T; 3],
 }
 
 /// Points of two image planes, in pixels of one common scale around the principal points: x1, y1, x2, y2.
@@ -135,6 +161,23 @@ pub(crate) type BearingBlock<T> = [Lanes<T>; 18];
 #[inline(always)]
 fn inverse_or_zero<T: Real>(d: T) -> T {
     if d >= T::MIN_POSITIVE { T::ONE / d } else { T::ZERO }
+}
+
+/// The points of a lane in a frame, and their epipolar lines in view 1 and view 2.
+#[inline(always)]
+fn plane_lines<T: Real>(
+    block: &PlaneBlock<T>,
+    frame: &Frame<T>,
+    l: usize,
+) -> ([T; 3], [T; 3], [T; 2], [T; 2]) {
+    let (m, n) = (&frame.view1.data.0, &frame.view2.data.0);
+    let (x1, y1, x2, y2) = (block[0][l], block[1][l], block[2][l], block[3][l]);
+    let y = |i: usize| m[0][i] * x1 + m[1][i] * y1 + m[2][i];
+    let x = |i: usize| n[i][0] * x2 + n[i][1] * y2 + n[i][2];
+    let (y, x) = ([y(0), y(1), y(2)], [x(0), x(1), x(2)]);
+    let l1 = [m[0][0] * x[1] - m[0][1] * x[0], m[1][0] * x[1] - m[1][1] * x[0]];
+    let l2 = [n[1][0] * y[0] - n[0][0] * y[1], n[1][1] * y[0] - n[0][1] * y[1]];
+    (y, x, l1, l2)
 }
 
 impl<T: Real> EpipolarBlock<T> for PlaneBlock<T> {
@@ -155,61 +198,45 @@ impl<T: Real> EpipolarBlock<T> for PlaneBlock<T> {
         (c, d)
     }
 
-    #[cfg_attr(not(small), inline(always))]
-    fn gradient(&self, f: &Matrix3<T>) -> (Lanes<T>, Lanes<T>, [Lanes<T>; 9]) {
+    #[inline(always)]
+    fn gradient(&self, f: &Matrix3<T>, l: usize) -> (T, T, [T; 9]) {
         let m = &f.data.0;
-        let (mut value, mut inverse) = ([T::ZERO; LANES], [T::ZERO; LANES]);
-        let mut g = [[T::ZERO; LANES]; 9];
-        for l in 0..LANES {
-            let (x1, y1, x2, y2) = (self[0][l], self[1][l], self[2][l], self[3][l]);
-            let a = m[0][0] * x1 + m[1][0] * y1 + m[2][0];
-            let b = m[0][1] * x1 + m[1][1] * y1 + m[2][1];
-            let e = m[0][2] * x1 + m[1][2] * y1 + m[2][2];
-            let p = m[0][0] * x2 + m[0][1] * y2 + m[0][2];
-            let q = m[1][0] * x2 + m[1][1] * y2 + m[1][2];
-            let c = x2 * a + y2 * b + e;
-            let d = (a * a + b * b) + (p * p + q * q);
-            (value[l], inverse[l]) = (c, inverse_or_zero(d));
-            let k = c * inverse[l];
-            // sqrt(d) dr = x2 x1' - k (M2 l2 x1' + x2 (M1 l1)')
-            let (u, v) = (x2 - k * a, y2 - k * b);
-            let (s, t) = (k * p, k * q);
-            g[0][l] = u * x1 - x2 * s;
-            g[1][l] = u * y1 - x2 * t;
-            g[2][l] = u;
-            g[3][l] = v * x1 - y2 * s;
-            g[4][l] = v * y1 - y2 * t;
-            g[5][l] = v;
-            g[6][l] = x1 - s;
-            g[7][l] = y1 - t;
-            g[8][l] = T::ONE;
-        }
-        (value, inverse, g)
+        let (x1, y1, x2, y2) = (self[0][l], self[1][l], self[2][l], self[3][l]);
+        let a = m[0][0] * x1 + m[1][0] * y1 + m[2][0];
+        let b = m[0][1] * x1 + m[1][1] * y1 + m[2][1];
+        let e = m[0][2] * x1 + m[1][2] * y1 + m[2][2];
+        let p = m[0][0] * x2 + m[0][1] * y2 + m[0][2];
+        let q = m[1][0] * x2 + m[1][1] * y2 + m[1][2];
+        let c = x2 * a + y2 * b + e;
+        let inverse = inverse_or_zero((a * a + b * b) + (p * p + q * q));
+        let k = c * inverse;
+        // sqrt(d) dr = x2 x1' - k (M2 l2 x1' + x2 (M1 l1)')
+        let (u, v) = (x2 - k * a, y2 - k * b);
+        let (s, t) = (k * p, k * q);
+        let first = [u * x1 - x2 * s, u * y1 - x2 * t, u];
+        let second = [v * x1 - y2 * s, v * y1 - y2 * t, v];
+        let ([g0, g1, g2], [g3, g4, g5]) = (first, second);
+        (c, inverse, [g0, g1, g2, g3, g4, g5, x1 - s, y1 - t, T::ONE])
     }
 
-    #[cfg_attr(not(small), inline(always))]
-    fn in_frame(&self, frame: &Frame<T>) -> InFrame<T> {
+    #[inline(always)]
+    fn sight(&self, frame: &Frame<T>, l: usize) -> Sight<T> {
+        let (y, x, l1, l2) = plane_lines(self, frame, l);
+        let d = (l2[0] * l2[0] + l2[1] * l2[1]) + (l1[0] * l1[0] + l1[1] * l1[1]);
+        Sight { y, x, c: x[1] * y[0] - x[0] * y[1], d }
+    }
+
+    #[inline(always)]
+    fn in_frame(&self, frame: &Frame<T>, l: usize) -> InFrame<T> {
         let (m, n) = (&frame.view1.data.0, &frame.view2.data.0);
-        let mut all = InFrame::zero();
-        for l in 0..LANES {
-            let (x1, y1, x2, y2) = (self[0][l], self[1][l], self[2][l], self[3][l]);
-            let y = |i: usize| m[0][i] * x1 + m[1][i] * y1 + m[2][i];
-            let x = |i: usize| n[i][0] * x2 + n[i][1] * y2 + n[i][2];
-            let (y, x) = ([y(0), y(1), y(2)], [x(0), x(1), x(2)]);
-            let l1 = [m[0][0] * x[1] - m[0][1] * x[0], m[1][0] * x[1] - m[1][1] * x[0]];
-            let l2 = [n[1][0] * y[0] - n[0][0] * y[1], n[1][1] * y[0] - n[0][1] * y[1]];
-            let c = x[1] * y[0] - x[0] * y[1];
-            let inverse = inverse_or_zero((l2[0] * l2[0] + l2[1] * l2[1]) + (l1[0] * l1[0] + l1[1] * l1[1]));
-            let k = c * inverse;
-            let (s, t) = ([k * l1[0], k * l1[1]], [k * l2[0], k * l2[1]]);
-            for i in 0..3 {
-                (all.y[i][l], all.x[i][l]) = (y[i], x[i]);
-                all.z[i][l] = m[0][i] * s[0] + m[1][i] * s[1];
-                all.a[i][l] = n[i][0] * t[0] + n[i][1] * t[1];
-            }
-            (all.c[l], all.inverse[l]) = (c, inverse);
-        }
-        all
+        let (y, x, l1, l2) = plane_lines(self, frame, l);
+        let c = x[1] * y[0] - x[0] * y[1];
+        let inverse = inverse_or_zero((l2[0] * l2[0] + l2[1] * l2[1]) + (l1[0] * l1[0] + l1[1] * l1[1]));
+        let k = c * inverse;
+        let (s, t) = ([k * l1[0], k * l1[1]], [k * l2[0], k * l2[1]]);
+        let z = |i: usize| m[0][i] * s[0] + m[1][i] * s[1];
+        let a = |i: usize| n[i][0] * t[0] + n[i][1] * t[1];
+        InFrame { y, x, c, inverse, z: [z(0), z(1), z(2)], a: [a(0), a(1), a(2)] }
     }
 
     fn mispaired(&self, other: &Self) -> Self {
@@ -255,6 +282,36 @@ fn metrics<T: Real>(block: &BearingBlock<T>, l: usize, l1: &[T; 3], l2: &[T; 3])
     (n1, n2)
 }
 
+/// A vector of view 1 in a frame.
+#[inline(always)]
+fn turned1<T: Real>(frame: &Frame<T>, v: &[T; 3]) -> [T; 3] {
+    let m = &frame.view1.data.0;
+    let row = |i: usize| m[0][i] * v[0] + m[1][i] * v[1] + m[2][i] * v[2];
+    [row(0), row(1), row(2)]
+}
+
+/// A vector of view 2 in a frame.
+#[inline(always)]
+fn turned2<T: Real>(frame: &Frame<T>, v: &[T; 3]) -> [T; 3] {
+    let n = &frame.view2.data.0;
+    [dot(&n[0], v), dot(&n[1], v), dot(&n[2], v)]
+}
+
+/// The bearings of a lane in a frame, and their epipolar lines in view 1 and view 2.
+#[inline(always)]
+fn bearing_lines<T: Real>(
+    block: &BearingBlock<T>,
+    frame: &Frame<T>,
+    l: usize,
+) -> ([T; 3], [T; 3], [T; 3], [T; 3]) {
+    let (m, n) = (&frame.view1.data.0, &frame.view2.data.0);
+    let y = turned1(frame, &[block[0][l], block[1][l], block[2][l]]);
+    let x = turned2(frame, &[block[3][l], block[4][l], block[5][l]]);
+    let l1 = |j: usize| m[j][0] * x[1] - m[j][1] * x[0];
+    let l2 = |i: usize| n[1][i] * y[0] - n[0][i] * y[1];
+    (y, x, [l1(0), l1(1), l1(2)], [l2(0), l2(1), l2(2)])
+}
+
 impl<T: Real> EpipolarBlock<T> for BearingBlock<T> {
     #[cfg_attr(not(small), inline(always))]
     fn residual(&self, f: &Matrix3<T>) -> (Lanes<T>, Lanes<T>) {
@@ -268,54 +325,39 @@ impl<T: Real> EpipolarBlock<T> for BearingBlock<T> {
         (c, d)
     }
 
-    #[cfg_attr(not(small), inline(always))]
-    fn gradient(&self, f: &Matrix3<T>) -> (Lanes<T>, Lanes<T>, [Lanes<T>; 9]) {
-        let (mut value, mut inverse) = ([T::ZERO; LANES], [T::ZERO; LANES]);
-        let mut g = [[T::ZERO; LANES]; 9];
-        for l in 0..LANES {
-            let (f1, f2, l1, l2) = lines(self, f, l);
-            let (n1, n2) = metrics(self, l, &l1, &l2);
-            value[l] = dot(&f2, &l2);
-            inverse[l] = inverse_or_zero(dot(&l2, &n2) + dot(&l1, &n1));
-            let k = value[l] * inverse[l];
-            for i in 0..3 {
-                let u = f2[i] - k * n2[i];
-                for j in 0..3 {
-                    g[3 * i + j][l] = u * f1[j] - f2[i] * (k * n1[j]);
-                }
+    #[inline(always)]
+    fn gradient(&self, f: &Matrix3<T>, l: usize) -> (T, T, [T; 9]) {
+        let (f1, f2, l1, l2) = lines(self, f, l);
+        let (n1, n2) = metrics(self, l, &l1, &l2);
+        let c = dot(&f2, &l2);
+        let inverse = inverse_or_zero(dot(&l2, &n2) + dot(&l1, &n1));
+        let k = c * inverse;
+        let mut g = [T::ZERO; 9];
+        for i in 0..3 {
+            let u = f2[i] - k * n2[i];
+            for j in 0..3 {
+                g[3 * i + j] = u * f1[j] - f2[i] * (k * n1[j]);
             }
         }
-        (value, inverse, g)
+        (c, inverse, g)
     }
 
-    #[cfg_attr(not(small), inline(always))]
-    fn in_frame(&self, frame: &Frame<T>) -> InFrame<T> {
-        let (m, n) = (&frame.view1.data.0, &frame.view2.data.0);
-        let mut all = InFrame::zero();
-        for l in 0..LANES {
-            let f1 = [self[0][l], self[1][l], self[2][l]];
-            let f2 = [self[3][l], self[4][l], self[5][l]];
-            let from1 = |v: &[T; 3]| {
-                let row = |i: usize| m[0][i] * v[0] + m[1][i] * v[1] + m[2][i] * v[2];
-                [row(0), row(1), row(2)]
-            };
-            let from2 = |v: &[T; 3]| [dot(&n[0], v), dot(&n[1], v), dot(&n[2], v)];
-            let (y, x) = (from1(&f1), from2(&f2));
-            let l1 = |j: usize| m[j][0] * x[1] - m[j][1] * x[0];
-            let l2 = |i: usize| n[1][i] * y[0] - n[0][i] * y[1];
-            let (l1, l2) = ([l1(0), l1(1), l1(2)], [l2(0), l2(1), l2(2)]);
-            let (n1, n2) = metrics(self, l, &l1, &l2);
-            let c = x[1] * y[0] - x[0] * y[1];
-            let inverse = inverse_or_zero(dot(&l2, &n2) + dot(&l1, &n1));
-            let k = c * inverse;
-            let (z, a) = (from1(&n1), from2(&n2));
-            for i in 0..3 {
-                (all.y[i][l], all.x[i][l]) = (y[i], x[i]);
-                (all.z[i][l], all.a[i][l]) = (k * z[i], k * a[i]);
-            }
-            (all.c[l], all.inverse[l]) = (c, inverse);
-        }
-        all
+    #[inline(always)]
+    fn sight(&self, frame: &Frame<T>, l: usize) -> Sight<T> {
+        let (y, x, l1, l2) = bearing_lines(self, frame, l);
+        let (n1, n2) = metrics(self, l, &l1, &l2);
+        Sight { y, x, c: x[1] * y[0] - x[0] * y[1], d: dot(&l2, &n2) + dot(&l1, &n1) }
+    }
+
+    #[inline(always)]
+    fn in_frame(&self, frame: &Frame<T>, l: usize) -> InFrame<T> {
+        let (y, x, l1, l2) = bearing_lines(self, frame, l);
+        let (n1, n2) = metrics(self, l, &l1, &l2);
+        let c = x[1] * y[0] - x[0] * y[1];
+        let inverse = inverse_or_zero(dot(&l2, &n2) + dot(&l1, &n1));
+        let k = c * inverse;
+        let (z, a) = (turned1(frame, &n1), turned2(frame, &n2));
+        InFrame { y, x, c, inverse, z: z.map(|z| k * z), a: a.map(|a| k * a) }
     }
 
     fn mispaired(&self, other: &Self) -> Self {
@@ -349,36 +391,4 @@ impl<T: Real> EpipolarBlock<T> for BearingBlock<T> {
     fn directions(&self) -> ([Lanes<T>; 3], [Lanes<T>; 3]) {
         ([self[0], self[1], self[2]], [self[3], self[4], self[5]])
     }
-}
-
-/// Which lanes hold a point that lies in front of both cameras of a pose `X2 = R X1 + t`, or whose rays are parallel
-/// to within noise, so that its depth says nothing: `parallel_sq` is the squared sine up to which they are.
-#[cfg_attr(not(small), inline(always))]
-pub(crate) fn in_front<T: Real>(
-    f1: &[Lanes<T>; 3],
-    f2: &[Lanes<T>; 3],
-    rotation: &Matrix3<T>,
-    translation: &Vector3<T>,
-    parallel_sq: T,
-) -> [bool; LANES] {
-    let r = &rotation.data.0;
-    let t = &translation.data.0[0];
-    let mut front = [false; LANES];
-    for l in 0..LANES {
-        let (x, y, z) = (f1[0][l], f1[1][l], f1[2][l]);
-        let a = [
-            r[0][0] * x + r[1][0] * y + r[2][0] * z,
-            r[0][1] * x + r[1][1] * y + r[2][1] * z,
-            r[0][2] * x + r[1][2] * y + r[2][2] * z,
-        ];
-        let b = [f2[0][l], f2[1][l], f2[2][l]];
-        // d1 a + t = d2 b, in the least-squares sense: both depths times |a x b|^2.
-        let (aa, bb, ab) = (dot(&a, &a), dot(&b, &b), dot(&a, &b));
-        let (ta, tb) = (dot(t, &a), dot(t, &b));
-        let depth1 = ab * tb - bb * ta;
-        let depth2 = aa * tb - ab * ta;
-        let parallel = aa * bb - ab * ab <= parallel_sq * aa * bb && ab > T::ZERO;
-        front[l] = (depth1 > T::ZERO && depth2 > T::ZERO) || parallel;
-    }
-    front
 }

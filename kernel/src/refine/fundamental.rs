@@ -3,9 +3,10 @@
 use nalgebra::{Matrix3, SVector, Vector3};
 
 use super::blocks::EpipolarBlock;
-use super::lm::{EpipolarModel, Manifold, Rows, rows_along};
+use super::lm::{EpipolarModel, Manifold, Row};
 use crate::Real;
 use crate::geometry::pose::tangent_basis;
+use crate::linalg::LANES;
 use crate::linalg::least_singular3;
 use crate::real::sqrt;
 
@@ -106,8 +107,26 @@ impl<T: Real> EpipolarModel<T, 7> for FundamentalModel<T> {
     }
 
     #[cfg_attr(not(small), inline(always))]
-    fn rows<B: EpipolarBlock<T>>((matrix, tangents): &Self::Frame, block: &B) -> Rows<T, 7> {
-        rows_along(matrix, tangents, block)
+    fn inside<B: EpipolarBlock<T>>((matrix, _): &Self::Frame, block: &B, limit: T) -> [bool; LANES] {
+        let (c, d) = block.residual(matrix);
+        let mut inside = [false; LANES];
+        for l in 0..LANES {
+            inside[l] = c[l] * c[l] < limit * d[l];
+        }
+        inside
+    }
+
+    #[inline(always)]
+    fn row<B: EpipolarBlock<T>>((matrix, tangents): &Self::Frame, block: &B, l: usize) -> Row<T, 7> {
+        let (c, inverse, g) = block.gradient(matrix, l);
+        let along = |tangent: &[T; 9]| {
+            let mut sum = g[0] * tangent[0];
+            for k in 1..9 {
+                sum += g[k] * tangent[k];
+            }
+            sum
+        };
+        Row { c, inverse, j: tangents.each_ref().map(along) }
     }
 }
 

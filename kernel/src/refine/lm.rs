@@ -28,25 +28,24 @@ pub(crate) trait EpipolarModel<T: Real, const P: usize>: Manifold<T, P> {
     type Frame;
     /// What a pass over the data needs of the model.
     fn frame(&self) -> Self::Frame;
-    /// The residuals of a block and their derivatives.
-    fn rows<B: EpipolarBlock<T>>(frame: &Self::Frame, block: &B) -> Rows<T, P>;
+    /// Which correspondences of a block have a squared residual below `limit`, and may be explained by the model at all (are in
+    /// front of the cameras).
+    fn inside<B: EpipolarBlock<T>>(frame: &Self::Frame, block: &B, limit: T) -> [bool; LANES];
+    /// The residual of a correspondence and its derivatives.
+    fn row<B: EpipolarBlock<T>>(frame: &Self::Frame, block: &B, lane: usize) -> Row<T, P>;
     /// Sums by the parameters of the rows, as sums by those of the model.
     fn turn_back(_frame: &Self::Frame, _sums: &mut NormalEquations<T, P>) {}
-    /// Which correspondences of a block the model may explain at all (those in front of the cameras).
-    #[cfg_attr(not(small), inline(always))]
-    fn admits<B: EpipolarBlock<T>>(&self, _block: &B) -> [bool; LANES] {
-        [true; LANES]
-    }
 }
 
-/// Residuals `r = c / sqrt(d)` of a block, without a root: only squares and products of them are summed.
-pub(crate) struct Rows<T, const P: usize> {
+/// The residual `r = c / sqrt(d)` of a correspondence, without a root: only squares and products of them are summed.
+#[derive(Clone, Copy)]
+pub(crate) struct Row<T, const P: usize> {
     /// `c`.
-    pub(crate) c: Lanes<T>,
+    pub(crate) c: T,
     /// `1 / d`.
-    pub(crate) inverse: Lanes<T>,
+    pub(crate) inverse: T,
     /// `sqrt(d)` times the derivatives of `r`.
-    pub(crate) j: [Lanes<T>; P],
+    pub(crate) j: [T; P],
 }
 
 /// Sums of one pass: `J'WJ`, `J'Wr` and the cost.
@@ -100,10 +99,44 @@ impl<T: Real, const P: usize> Sums<T, P> {
     const ZERO: Self =
         Self { hessian: [[[T::ZERO; LANES]; P]; P], gradient: [[T::ZERO; LANES]; P], cost: [T::ZERO; LANES] };
 
-    /// Adds the lanes of a block of which the first `filled` count.
+    /// Adds the lanes of a block of which the first `filled` count: side by side, or where a core has no registers for that one
+    /// after the other, each in registers from the pixels to the sums. The sums are the same.
     #[cfg_attr(not(small), inline(always))]
-    fn add(&mut self, rows: &Rows<T, P>, loss: &Loss<T>, filled: usize) {
-        let Rows { c, inverse, j } = rows;
+    fn add<B: EpipolarBlock<T>, M: EpipolarModel<T, P>>(
+        &mut self,
+        frame: &M::Frame,
+        block: &B,
+        loss: &Loss<T>,
+        filled: usize,
+    ) {
+        if cfg!(scalar) {
+            for l in 0..LANES {
+                if l < filled {
+                    let Row { c, inverse, j } = M::row(frame, block, l);
+                    let (cost, weight) = loss.evaluate(c * c * inverse);
+                    self.cost[l] += cost;
+                    let w = weight * inverse;
+                    for p in 0..P {
+                        let weighted = w * j[p];
+                        self.gradient[p][l] += weighted * c;
+                        for q in 0..P {
+                            if q <= p {
+                                self.hessian[p][q][l] += weighted * j[q];
+                            }
+                        }
+                    }
+                }
+            }
+            return;
+        }
+        let (mut c, mut inverse, mut j) = ([T::ZERO; LANES], [T::ZERO; LANES], [[T::ZERO; LANES]; P]);
+        for l in 0..LANES {
+            let row = M::row(frame, block, l);
+            (c[l], inverse[l]) = (row.c, row.inverse);
+            for p in 0..P {
+                j[p][l] = row.j[p];
+            }
+        }
         let mut w = [T::ZERO; LANES];
         for l in 0..LANES {
             if l < filled {
@@ -127,27 +160,6 @@ impl<T: Real, const P: usize> Sums<T, P> {
             }
         }
     }
-}
-
-/// The rows of a model whose matrix moves along `tangents`.
-#[cfg_attr(not(small), inline(always))]
-pub(crate) fn rows_along<T: Real, B: EpipolarBlock<T>, const P: usize>(
-    f: &Matrix3<T>,
-    tangents: &[[T; 9]; P],
-    block: &B,
-) -> Rows<T, P> {
-    let (c, inverse, g) = block.gradient(f);
-    let mut j = [[T::ZERO; LANES]; P];
-    for p in 0..P {
-        for l in 0..LANES {
-            let mut sum = g[0][l] * tangents[p][0];
-            for k in 1..9 {
-                sum += g[k][l] * tangents[p][k];
-            }
-            j[p][l] = sum;
-        }
-    }
-    Rows { c, inverse, j }
 }
 
 #[cfg_attr(not(small), inline(always))]
@@ -184,7 +196,7 @@ where
     M: EpipolarModel<T, P>,
 {
     let step = core::cmp::max(step, 1);
-    let (f, frame) = (model.matrix(), model.frame());
+    let frame = model.frame();
     let mut sums = Sums::<T, P>::ZERO;
     let support = loss.support();
     let limit = support.unwrap_or(T::MAX);
@@ -196,19 +208,14 @@ where
     for block in data.blocks.iter().step_by(step).map(Some).chain(core::iter::once(None)) {
         let packed;
         let (current, lanes) = if let Some(block) = block {
-            let (c, d) = block.residual(&f);
-            let mut inside = [false; LANES];
+            let mut inside = M::inside(&frame, block, limit);
             for l in 0..LANES {
-                inside[l] = l < left && c[l] * c[l] < limit * d[l];
+                inside[l] &= l < left;
             }
             seen += core::cmp::min(left, LANES);
             left = left.saturating_sub(step.saturating_mul(LANES));
             if inside == [false; LANES] {
                 continue;
-            }
-            let admitted = model.admits(block);
-            for l in 0..LANES {
-                inside[l] &= admitted[l];
             }
             if inside == [true; LANES] {
                 active += LANES as u32;
@@ -234,7 +241,7 @@ where
             (&pending, filled)
         };
         if lanes > 0 {
-            sums.add(&M::rows(&frame, current), loss, lanes);
+            sums.add::<B, M>(&frame, current, loss, lanes);
         }
     }
     let mut equations = NormalEquations::zero();

@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, SVector, Vector3};
 
-use super::blocks::{EpipolarBlock, Frame, InFrame, in_front};
-use super::lm::{EpipolarModel, Manifold, NormalEquations, Rows};
+use super::blocks::{EpipolarBlock, Frame, InFrame};
+use super::lm::{EpipolarModel, Manifold, NormalEquations, Row};
 use crate::Real;
 use crate::geometry::Pose;
 use crate::geometry::pose::{from_parts, tangent_basis};
@@ -136,7 +136,9 @@ fn cross<T: Real>(a: &[T; 3], b: &[T; 3]) -> [T; 3] {
 /// The axes of a frame along the translation, and the views in it.
 pub(crate) struct PoseFrame<T: Real> {
     axes: Matrix3<T>,
-    views: Frame<T>,
+    pub(crate) views: Frame<T>,
+    /// As in [`Scales`].
+    pub(crate) parallel_sq: T,
 }
 
 impl<T: Real> Manifold<T, 5> for PoseModel<T> {
@@ -174,25 +176,33 @@ impl<T: Real> EpipolarModel<T, 5> for PoseModel<T> {
                 view2.data.0[i][k] *= s2[k];
             }
         }
-        PoseFrame { axes, views: Frame { view1, view2 } }
+        PoseFrame { axes, views: Frame { view1, view2 }, parallel_sq: self.scales.parallel_sq }
+    }
+
+    #[cfg_attr(not(small), inline(always))]
+    fn inside<B: EpipolarBlock<T>>(frame: &PoseFrame<T>, block: &B, limit: T) -> [bool; LANES] {
+        let mut inside = [false; LANES];
+        for l in 0..LANES {
+            let sight = block.sight(&frame.views, l);
+            inside[l] = sight.c * sight.c < limit * sight.d && sight.in_front(frame.parallel_sq);
+        }
+        inside
     }
 
     /// By a rotation of the frame, and by the translation along its first two axes:
     /// `sqrt(d) dr = p (dE y) - x (dE z)` with `p = x - a`, where `dE y = e3 x (w x y)` or `e_k x y`.
-    #[cfg_attr(not(small), inline(always))]
-    #[cfg_attr(small, inline(never))]
-    fn rows<B: EpipolarBlock<T>>(frame: &PoseFrame<T>, block: &B) -> Rows<T, 5> {
-        let InFrame { y, x, c, inverse, z, a } = &block.in_frame(&frame.views);
-        let mut j = [[T::ZERO; LANES]; 5];
-        for l in 0..LANES {
-            let p = [x[0][l] - a[0][l], x[1][l] - a[1][l], x[2][l] - a[2][l]];
-            j[0][l] = p[0] * y[2][l] - x[0][l] * z[2][l];
-            j[1][l] = p[1] * y[2][l] - x[1][l] * z[2][l];
-            j[2][l] = (x[0][l] * z[0][l] + x[1][l] * z[1][l]) - (p[0] * y[0][l] + p[1] * y[1][l]);
-            j[3][l] = (y[1][l] * p[2] - y[2][l] * p[1]) - (z[1][l] * x[2][l] - z[2][l] * x[1][l]);
-            j[4][l] = (y[2][l] * p[0] - y[0][l] * p[2]) - (z[2][l] * x[0][l] - z[0][l] * x[2][l]);
-        }
-        Rows { c: *c, inverse: *inverse, j }
+    #[inline(always)]
+    fn row<B: EpipolarBlock<T>>(frame: &PoseFrame<T>, block: &B, l: usize) -> Row<T, 5> {
+        let InFrame { y, x, c, inverse, z, a } = block.in_frame(&frame.views, l);
+        let p = [x[0] - a[0], x[1] - a[1], x[2] - a[2]];
+        let j = [
+            p[0] * y[2] - x[0] * z[2],
+            p[1] * y[2] - x[1] * z[2],
+            (x[0] * z[0] + x[1] * z[1]) - (p[0] * y[0] + p[1] * y[1]),
+            (y[1] * p[2] - y[2] * p[1]) - (z[1] * x[2] - z[2] * x[1]),
+            (y[2] * p[0] - y[0] * p[2]) - (z[2] * x[0] - z[0] * x[2]),
+        ];
+        Row { c, inverse, j }
     }
 
     fn turn_back(frame: &PoseFrame<T>, sums: &mut NormalEquations<T, 5>) {
@@ -211,18 +221,5 @@ impl<T: Real> EpipolarModel<T, 5> for PoseModel<T> {
                 columns[q][p] = row[q];
             }
         }
-    }
-
-    #[cfg_attr(not(small), inline(always))]
-    fn admits<B: EpipolarBlock<T>>(&self, block: &B) -> [bool; LANES] {
-        let (mut f1, mut f2) = block.directions();
-        let (s1, s2) = (self.scales.inverse1(), self.scales.inverse2());
-        for l in 0..LANES {
-            f1[0][l] *= s1[0];
-            f1[1][l] *= s1[1];
-            f2[0][l] *= s2[0];
-            f2[1][l] *= s2[1];
-        }
-        in_front(&f1, &f2, &self.rotation, &self.translation, self.scales.parallel_sq)
     }
 }

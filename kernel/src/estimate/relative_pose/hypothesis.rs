@@ -12,7 +12,7 @@ use crate::refine::homography::{RotationModel, transfer_sq};
 use crate::refine::lm::{
     EpipolarModel, Manifold, Minimum, NormalEquations, descend, normal_equations, sampled_equations,
 };
-use crate::refine::relative_pose::{PoseModel, Scales};
+use crate::refine::relative_pose::{PoseFrame, PoseModel, Scales};
 use crate::robust::loss::Loss;
 use crate::robust::{Estimator, Gate, Score, ScoreCounts, Tally};
 use crate::solvers::relpose_5pt;
@@ -76,32 +76,22 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         Some((pick(&f1, a)?, pick(&f2, b)?))
     }
 
-    /// Squared residuals of a block in units of the squared threshold.
-    #[cfg_attr(not(small), inline(always))]
-    fn squared(&self, block: &B, f: &Matrix3<T>, scale: T) -> Lanes<T> {
-        let (c, d) = block.residual(f);
-        let mut squared = [T::ZERO; LANES];
-        for l in 0..LANES {
-            squared[l] = c[l] * c[l] * scale / d[l];
-        }
-        squared
-    }
-
     /// Squared residuals of a block in units of the squared threshold; of a point behind a camera, the largest number.
     #[cfg_attr(not(small), inline(always))]
-    fn squared_in_front(&self, block: &B, model: &PoseModel<T>, view: &View<T>) -> Lanes<T> {
-        let mut squared = self.squared(block, &view.matrix, view.scale);
-        if squared[0] < T::ONE || squared[1] < T::ONE || squared[2] < T::ONE || squared[3] < T::ONE {
-            let front = model.admits(block);
-            for l in 0..LANES {
-                squared[l] = if front[l] { squared[l] } else { T::MAX };
+    fn squared(&self, block: &B, view: &View<T>) -> Lanes<T> {
+        let mut squared = [T::ZERO; LANES];
+        for l in 0..LANES {
+            let sight = block.sight(&view.frame.views, l);
+            squared[l] = sight.c * sight.c * view.scale / sight.d;
+            if squared[l] < T::ONE && !sight.in_front(view.frame.parallel_sq) {
+                squared[l] = T::MAX;
             }
         }
         squared
     }
 
     fn view(&self, model: &PoseModel<T>) -> View<T> {
-        View { matrix: model.matrix(), scale: T::ONE / (self.threshold * self.threshold) }
+        View { frame: model.frame(), scale: T::ONE / (self.threshold * self.threshold) }
     }
 
     /// Calls `each` with the squared residuals of every block in order, in units of the squared threshold, points
@@ -110,7 +100,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         let view = self.view(model);
         let mut left = self.data.count;
         for block in self.data.blocks {
-            each(block, &self.squared_in_front(block, model, &view), core::cmp::min(left, LANES));
+            each(block, &self.squared(block, &view), core::cmp::min(left, LANES));
             left = left.saturating_sub(LANES);
         }
     }
@@ -132,7 +122,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
             }
             let (start, end) = full.split_at_checked(shift).unwrap_or((full, &[]));
             for (block, other) in full.iter().zip(end.iter().chain(start)).step_by(every) {
-                let squared = self.squared_in_front(&block.mispaired(other), model, &view);
+                let squared = self.squared(&block.mispaired(other), &view);
                 for s in squared {
                     hits += (s < T::ONE) as u32;
                 }
@@ -188,7 +178,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         let (mut inliers, mut turned) = (0u32, 0u32);
         let mut left = self.data.count;
         for block in self.data.blocks.iter().step_by(every) {
-            let residual = self.squared(block, &view.matrix, view.scale);
+            let residual = self.squared(block, &view);
             let (plane, weight) = block.planes();
             let squared = transfer_sq(&h, &plane, &weight);
             let mut explained = [false; LANES];
@@ -218,12 +208,12 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
 
     /// How many correspondences of whole blocks lie within a threshold of a model, in front of the cameras or not.
     pub(super) fn within(&self, data: BlockSlice<'_, B>, model: &PoseModel<T>, threshold: T) -> u32 {
-        let (matrix, limit) = (model.matrix(), threshold * threshold);
+        let (frame, limit) = (model.frame(), threshold * threshold);
         let mut count = 0;
         for block in data.blocks.iter().take(data.count / LANES) {
-            let (c, d) = block.residual(&matrix);
             for l in 0..LANES {
-                count += (c[l] * c[l] < limit * d[l]) as u32;
+                let sight = block.sight(&frame.views, l);
+                count += (sight.c * sight.c < limit * sight.d) as u32;
             }
         }
         count
@@ -284,7 +274,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
 
 /// What is computed once a model.
 struct View<T: Real> {
-    matrix: Matrix3<T>,
+    frame: PoseFrame<T>,
     scale: T,
 }
 
@@ -326,7 +316,7 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
         let mut seen = 0u32;
         for k in 1..=blocks.len() {
             if let Some(block) = blocks.get(at) {
-                let squared = self.squared_in_front(block, model, &view);
+                let squared = self.squared(block, &view);
                 let filled = core::cmp::min(self.data.count.saturating_sub(at * LANES), LANES);
                 if filled == LANES {
                     tally.add(&squared);
