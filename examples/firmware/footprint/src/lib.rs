@@ -54,9 +54,9 @@ entries! {
     kannala_brandt_unproject(c: &KannalaBrandt<f32>, x: &V2) -> Option<V3> = c.unproject(x).ok();
     estimate_relative_pose(c: &Pinhole<f32>, a: &[V2], b: &[V2], o: &RelativePoseOptions<f32>, w: &mut RelativePoseWorkspace<'_, f32>)
         -> Option<RelativePoseEstimate<f32>> = relative_pose(c, c, a, b, o, w).ok();
-    estimate_relative_pose_and_points(c: &Pinhole<f32>, a: &[V2], b: &[V2], o: &RelativePoseOptions<f32>,
+    estimate_relative_pose_and_points(c: &Pinhole<f32>, a: &[V2], b: &[V2], max_error_px: f32,
         w: &mut RelativePoseWorkspace<'_, f32>, points: &mut [Option<V3>])
-        -> Option<RelativePoseEstimate<f32>> = with_points(c, a, b, o, w, points);
+        -> Option<RelativePoseEstimate<f32>> = with_points(c, a, b, max_error_px, w, points);
     estimate_absolute_pose(c: &Pinhole<f32>, a: &[V2], b: &[V3], o: &AbsolutePoseOptions<f32>, w: &mut AbsolutePoseWorkspace<'_, f32>)
         -> Option<AbsolutePoseEstimate<f32>> = absolute_pose(c, a, b, o, w).ok();
     estimate_homography(a: &[V2], b: &[V2], o: &HomographyOptions<f32>, w: &mut HomographyWorkspace<'_, f32>)
@@ -70,16 +70,20 @@ entries! {
     window_marginalise(w: &mut Window<'_, f32>, loss: &Loss<f32>) -> bool = oldest(w, loss).is_some();
 }
 
-/// A relative pose and the points of its inliers.
+/// A relative pose and the points of its inliers, by options that the compiler sees: what none of them asks for (priors) is
+/// left out.
+#[inline(always)]
 fn with_points(
     camera: &Pinhole<f32>,
     x1: &[V2],
     x2: &[V2],
-    options: &RelativePoseOptions<f32>,
+    max_error_px: f32,
     workspace: &mut RelativePoseWorkspace<'_, f32>,
     points: &mut [Option<V3>],
 ) -> Option<RelativePoseEstimate<f32>> {
-    let estimate = relative_pose(camera, camera, x1, x2, options, workspace).ok()?;
+    let mut options = RelativePoseOptions::default();
+    options.max_error_px = max_error_px;
+    let estimate = relative_pose(camera, camera, x1, x2, &options, workspace).ok()?;
     let pair = ViewPair::new(&estimate.pose()?);
     let views = x1.iter().zip(x2).zip(workspace.inliers());
     for (point, ((a, b), &inlier)) in points.iter_mut().zip(views) {
