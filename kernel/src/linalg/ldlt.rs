@@ -40,34 +40,10 @@ impl<T: Real, const N: usize> Ldlt<T, N> {
     /// N^3 / 6 multiplications, N divisions.
     #[must_use]
     pub fn new(a: &SMatrix<T, N, N>) -> Option<Self> {
-        let mut lower = [[T::ZERO; N]; N];
-        let mut inverse_d = [T::ZERO; N];
-        let floor = from_u32::<T>(N as u32) * T::EPSILON;
-        for i in 0..N {
-            // Row i of L D first (by forward substitution), of L after the division by D.
-            let mut row = [T::ZERO; N];
-            for j in 0..i {
-                let mut sum = a.data.0[j][i];
-                for k in 0..j {
-                    sum -= row[k] * lower[j][k];
-                }
-                row[j] = sum;
-            }
-            let diagonal = a.data.0[i][i];
-            let mut pivot = diagonal;
-            for j in 0..i {
-                let scaled = row[j] * inverse_d[j];
-                pivot -= scaled * row[j];
-                row[j] = scaled;
-            }
-            // Written so that NaN and infinity fail too.
-            if !(pivot > floor * diagonal && pivot > T::ZERO && pivot <= T::MAX) {
-                return None;
-            }
-            inverse_d[i] = T::ONE / pivot;
-            lower[i] = row;
-        }
-        Some(Self { lower, inverse_d })
+        let mut factors = Self { lower: [[T::ZERO; N]; N], inverse_d: [T::ZERO; N] };
+        let Self { lower, inverse_d } = &mut factors;
+        factor(a.data.0.as_flattened(), lower.as_flattened_mut(), inverse_d)?;
+        Some(factors)
     }
 
     /// `A^-1 B`, by substitution.
@@ -78,20 +54,7 @@ impl<T: Real, const N: usize> Ldlt<T, N> {
     pub fn solve<const M: usize>(&self, b: &SMatrix<T, N, M>) -> SMatrix<T, N, M> {
         let mut result = *b;
         for x in &mut result.data.0 {
-            for i in 0..N {
-                let mut sum = x[i];
-                for j in 0..i {
-                    sum -= self.lower[i][j] * x[j];
-                }
-                x[i] = sum;
-            }
-            for i in (0..N).rev() {
-                let mut sum = x[i] * self.inverse_d[i];
-                for j in i + 1..N {
-                    sum -= self.lower[j][i] * x[j];
-                }
-                x[i] = sum;
-            }
+            let _ = substitute(self.lower.as_flattened(), &self.inverse_d, x);
         }
         result
     }
@@ -102,29 +65,96 @@ impl<T: Real, const N: usize> Ldlt<T, N> {
     /// About N^3 / 2 multiplications.
     #[must_use]
     pub fn inverse(&self) -> SMatrix<T, N, N> {
-        // Columns of L^-1, then A^-1 = L^-T D^-1 L^-1.
         let mut columns = [[T::ZERO; N]; N];
-        for c in 0..N {
-            columns[c][c] = T::ONE;
-            for i in c + 1..N {
-                let mut sum = T::ZERO;
-                for j in c..i {
-                    sum -= self.lower[i][j] * columns[c][j];
-                }
-                columns[c][i] = sum;
-            }
-        }
-        let mut result = super::identity();
-        for i in 0..N {
-            for j in 0..=i {
-                let mut sum = T::ZERO;
-                for k in i..N {
-                    sum += columns[i][k] * columns[j][k] * self.inverse_d[k];
-                }
-                result.data.0[i][j] = sum;
-                result.data.0[j][i] = sum;
-            }
-        }
+        let mut result = SMatrix::<T, N, N>::zeros();
+        let inverse = result.data.0.as_flattened_mut();
+        let _ = invert(self.lower.as_flattened(), &self.inverse_d, columns.as_flattened_mut(), inverse);
         result
     }
+}
+
+// The work is done on slices, by functions that small code holds once for every N. Where N is known, no check is left.
+
+/// Row by row `L` and 1 / D of a matrix; none where it is not positive definite.
+#[cfg_attr(small, inline(never))]
+#[cfg_attr(not(small), inline(always))]
+fn factor<T: Real>(a: &[T], lower: &mut [T], inverse_d: &mut [T]) -> Option<()> {
+    let n = inverse_d.len();
+    let floor = from_u32::<T>(n as u32) * T::EPSILON;
+    for i in 0..n {
+        // Row i of L D first (by forward substitution), of L after the division by D.
+        let (above, row) = lower.split_at_mut_checked(i * n)?;
+        for j in 0..i {
+            let mut sum = *a.get(j * n + i)?;
+            for (x, y) in row.iter().zip(above.get(j * n..)?).take(j) {
+                sum -= *x * *y;
+            }
+            *row.get_mut(j)? = sum;
+        }
+        let diagonal = *a.get(i * n + i)?;
+        let mut pivot = diagonal;
+        for (x, inverse) in row.iter_mut().zip(&*inverse_d).take(i) {
+            let scaled = *x * *inverse;
+            pivot -= scaled * *x;
+            *x = scaled;
+        }
+        // Written so that NaN and infinity fail too.
+        if !(pivot > floor * diagonal && pivot > T::ZERO && pivot <= T::MAX) {
+            return None;
+        }
+        *inverse_d.get_mut(i)? = T::ONE / pivot;
+    }
+    Some(())
+}
+
+/// `x <- A^-1 x`.
+#[cfg_attr(small, inline(never))]
+#[cfg_attr(not(small), inline(always))]
+fn substitute<T: Real>(lower: &[T], inverse_d: &[T], x: &mut [T]) -> Option<()> {
+    let n = inverse_d.len();
+    for i in 0..n {
+        let (before, rest) = x.split_at_mut_checked(i)?;
+        let target = rest.first_mut()?;
+        for (l, y) in lower.get(i * n..)?.iter().zip(before) {
+            *target -= *l * *y;
+        }
+    }
+    for i in (0..n).rev() {
+        let (before, after) = x.split_at_mut_checked(i + 1)?;
+        let target = before.last_mut()?;
+        *target *= *inverse_d.get(i)?;
+        for (k, y) in after.iter().enumerate() {
+            *target -= *lower.get((i + 1 + k) * n + i)? * *y;
+        }
+    }
+    Some(())
+}
+
+/// `A^-1` from the columns of `L^-1`, for which there is memory: `L^-T D^-1 L^-1`.
+#[cfg_attr(small, inline(never))]
+#[cfg_attr(not(small), inline(always))]
+fn invert<T: Real>(lower: &[T], inverse_d: &[T], columns: &mut [T], inverse: &mut [T]) -> Option<()> {
+    let n = inverse_d.len();
+    for c in 0..n {
+        let column = columns.get_mut(c * n..c * n + n)?;
+        *column.get_mut(c)? = T::ONE;
+        for i in c + 1..n {
+            let mut sum = T::ZERO;
+            for j in c..i {
+                sum -= *lower.get(i * n + j)? * *column.get(j)?;
+            }
+            *column.get_mut(i)? = sum;
+        }
+    }
+    for i in 0..n {
+        for j in 0..=i {
+            let mut sum = T::ZERO;
+            for k in i..n {
+                sum += *columns.get(i * n + k)? * *columns.get(j * n + k)? * *inverse_d.get(k)?;
+            }
+            *inverse.get_mut(i * n + j)? = sum;
+            *inverse.get_mut(j * n + i)? = sum;
+        }
+    }
+    Some(())
 }
