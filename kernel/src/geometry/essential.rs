@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::cheirality::depth_signs;
-use super::pose::{from_parts, skew};
+use super::pose::{from_parts, rotation_matrix, skew};
 use super::{Fundamental, Pose};
 use crate::Real;
 use crate::linalg::least_singular3;
@@ -51,7 +51,7 @@ impl<T: Real> Essential<T> {
     /// ```
     #[must_use]
     pub fn from_pose(pose: &Pose<T>) -> Self {
-        Self(skew(&pose.translation.vector) * pose.rotation.to_rotation_matrix().into_inner())
+        Self(skew(&pose.translation.vector) * rotation_matrix(&pose.rotation))
     }
 
     /// `E = K2' F K1`, for calibration matrices that take normalised points to pixels.

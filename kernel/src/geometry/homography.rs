@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::Pose;
-use super::pose::from_parts;
-use crate::linalg::svd3;
+use super::pose::{from_parts, rotation_matrix};
+use crate::linalg::{product, svd3, times};
 use crate::real::{abs, is_finite, lit, sqrt};
 use crate::{Real, Solutions};
 
@@ -39,7 +39,7 @@ impl<T: Real> PlaneMotion<T> {
     /// ```
     #[must_use]
     pub fn homography(&self) -> Homography<T> {
-        let r = self.pose.rotation.to_rotation_matrix().into_inner();
+        let r = rotation_matrix(&self.pose.rotation);
         Homography(r + self.pose.translation.vector * self.normal.transpose())
     }
 }
@@ -174,21 +174,22 @@ impl<T: Real> Homography<T> {
         let sum = stretch + shrink;
         if !(sum > T::ZERO) {
             // U V' with the sign of the scaled H is the nearest rotation.
-            let r = svd.u * svd.v.transpose();
+            let r = product(&svd.u, &svd.v.transpose());
             let r = if determinant < T::ZERO { -r } else { r };
             motions.push(PlaneMotion { pose: from_parts(&r, &Vector3::zeros()), normal: Vector3::zeros() });
             return motions;
         }
         let (p, q) = (sqrt(shrink / sum), sqrt(stretch / sum));
-        let h2 = h * v2;
+        let h2 = times(&h, &v2);
         for sign in [T::ONE, -T::ONE] {
             // u and v2 span a plane whose vectors H does not stretch.
             let u = v1 * p + v3 * (q * sign);
-            let hu = h * u;
+            let hu = times(&h, &u);
             let normal = v2.cross(&u);
             let normal_in_2 = h2.cross(&hu);
-            let r = h2 * v2.transpose() + hu * u.transpose() + normal_in_2 * normal.transpose();
-            let t = h * normal - normal_in_2;
+            let after = Matrix3::from_columns(&[h2, hu, normal_in_2]);
+            let r = product(&after, &Matrix3::from_columns(&[v2, u, normal]).transpose());
+            let t = times(&h, &normal) - normal_in_2;
             motions.push(PlaneMotion { pose: from_parts(&r, &t), normal });
             motions.push(PlaneMotion { pose: from_parts(&r, &-t), normal: -normal });
             // u = v1 or v3: the other sign gives the same plane.

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix3, Matrix3x2, Quaternion, Translation3, UnitQuaternion, Vector3, Vector6};
 
 use crate::Real;
-use crate::linalg::{Svd3, svd3};
+use crate::linalg::{Svd3, product, svd3};
 use crate::real::{abs, atan2, is_finite, lit, max, sin_cos, sqrt};
 
 /// A pose maps into the camera: `x_cam = R X + t`. Of two views, the pose of view 2 in the frame of view 1:
@@ -262,6 +262,13 @@ pub fn tangent_basis<T: Real>(n: &Vector3<T>) -> Matrix3x2<T> {
     Matrix3x2::from_columns(&[e1, n.cross(&e1)])
 }
 
+/// The matrix of a rotation, by a call where code is to be small.
+#[cfg_attr(not(small), inline(always))]
+#[cfg_attr(small, inline(never))]
+pub(crate) fn rotation_matrix<T: Real>(rotation: &UnitQuaternion<T>) -> Matrix3<T> {
+    rotation.to_rotation_matrix().into_inner()
+}
+
 /// The rotation nearest to a matrix in the Frobenius norm: `U diag(1, 1, det(U V')) V'` of `M = U S V'`.
 ///
 /// # Returns
@@ -285,7 +292,8 @@ pub fn nearest_rotation<T: Real>(m: &Matrix3<T>) -> Option<Matrix3<T>> {
     let Svd3 { u, s, v } = svd3(m)?;
     let sign = if u.determinant() < T::ZERO { -T::ONE } else { T::ONE };
     let unique = s.y + sign * s.z > lit::<T>(16.0) * T::EPSILON * s.x;
-    unique.then(|| u * Matrix3::from_diagonal(&Vector3::new(T::ONE, T::ONE, sign)) * v.transpose())
+    let signs = Matrix3::from_diagonal(&Vector3::new(T::ONE, T::ONE, sign));
+    unique.then(|| product(&product(&u, &signs), &v.transpose()))
 }
 
 /// The rotation that turns a frame until the direction `gravity` of it lies along +y: `R gravity ~ (0, 1, 0)`, by the

@@ -4,7 +4,7 @@
 
 use nalgebra::{Matrix2x3, Matrix2x6, Matrix3, Matrix3x2, SMatrix, Vector2, Vector3};
 
-use super::pose::skew;
+use super::pose::{rotation_matrix, skew};
 use super::{CameraModel, Pose};
 use crate::Real;
 use crate::real::{is_finite, sqrt};
@@ -267,7 +267,7 @@ pub fn reprojection_with_jacobians<T: Real, C: CameraModel<T> + ?Sized>(
     point: &Vector3<T>,
     pixel: &Vector2<T>,
 ) -> Option<Reprojection<T>> {
-    let rotation = pose.rotation.to_rotation_matrix().into_inner();
+    let rotation = rotation_matrix(&pose.rotation);
     let rotated = rotation * point;
     let (projected, j) = camera.project_with_jacobian(&(rotated + pose.translation.vector))?;
     let residual = projected - pixel;

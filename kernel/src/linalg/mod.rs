@@ -1,6 +1,6 @@
 //! Small fixed-size linear algebra without panic paths or unbounded loops.
 
-use nalgebra::SMatrix;
+use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use crate::Real;
 use crate::real::{abs, is_finite, max};
@@ -29,6 +29,31 @@ pub use null_space::{null_space, null_space_refined};
 pub use quartic::quartic_roots;
 pub use row_qr::{LeastSingular, RowQr};
 pub use svd3::{Svd3, svd3};
+
+/// `A B`, by a call where code is to be small.
+#[cfg_attr(not(small), inline(always))]
+#[cfg_attr(small, inline(never))]
+pub(crate) fn product<T: Real>(a: &Matrix3<T>, b: &Matrix3<T>) -> Matrix3<T> {
+    a * b
+}
+
+/// `A x`, by a call where code is to be small.
+#[cfg_attr(not(small), inline(always))]
+#[cfg_attr(small, inline(never))]
+pub(crate) fn times<T: Real>(a: &Matrix3<T>, x: &Vector3<T>) -> Vector3<T> {
+    a * x
+}
+
+/// `[v]x A`: the cross products of a vector with the columns of a matrix.
+#[cfg_attr(not(small), inline(always))]
+#[cfg_attr(small, inline(never))]
+pub(crate) fn cross<T: Real>(v: &Vector3<T>, a: &Matrix3<T>) -> Matrix3<T> {
+    let mut result = *a;
+    for column in &mut result.data.0 {
+        *column = v.cross(&Vector3::from(*column)).data.0[0];
+    }
+    result
+}
 
 fn identity<T: Real, const N: usize>() -> SMatrix<T, N, N> {
     let mut result = SMatrix::zeros();

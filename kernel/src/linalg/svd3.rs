@@ -78,16 +78,10 @@ pub fn svd3<T: Real>(a: &Matrix3<T>) -> Option<Svd3<T>> {
     if !converged {
         return None;
     }
-    // Largest first. An exchange with a change of sign is a rotation: V stays one.
-    if m1.norm_squared() > m0.norm_squared() {
-        (m0, m1, v0, v1) = (m1, -m0, v1, -v0);
-    }
-    if m2.norm_squared() > m1.norm_squared() {
-        (m1, m2, v1, v2) = (m2, -m1, v2, -v1);
-    }
-    if m1.norm_squared() > m0.norm_squared() {
-        (m0, m1, v0, v1) = (m1, -m0, v1, -v0);
-    }
+    // Largest first.
+    sort(&mut m0, &mut m1, &mut v0, &mut v1);
+    sort(&mut m1, &mut m2, &mut v1, &mut v2);
+    sort(&mut m0, &mut m1, &mut v0, &mut v1);
 
     let s0 = sqrt(m0.norm_squared());
     let u0 = m0 / s0;
@@ -125,6 +119,15 @@ fn orthogonalise<T: Real>(
     (*a, *b) = (*a * cosine - *b * sine, *a * sine + *b * cosine);
     (*va, *vb) = (*va * cosine - *vb * sine, *va * sine + *vb * cosine);
     false
+}
+
+/// Exchanges two columns of A V and V where the second is the longer; with a change of sign it is a rotation: V stays one.
+#[cfg_attr(not(small), inline(always))]
+#[cfg_attr(small, inline(never))]
+fn sort<T: Real>(a: &mut Vector3<T>, b: &mut Vector3<T>, va: &mut Vector3<T>, vb: &mut Vector3<T>) {
+    if b.norm_squared() > a.norm_squared() {
+        (*a, *b, *va, *vb) = (*b, -*a, *vb, -*va);
+    }
 }
 
 /// A unit vector perpendicular to the unit vector `a`.

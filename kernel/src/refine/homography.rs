@@ -9,7 +9,7 @@ use super::blocks::{Block, BlockSlice, EpipolarBlock, PlaneBlock};
 use super::lm::{Manifold, NormalEquations, Tangents};
 use super::relative_pose::{Scales, cayley};
 use crate::Real;
-use crate::linalg::{LANES, Lanes};
+use crate::linalg::{LANES, Lanes, product};
 use crate::real::{abs, from_u32, sqrt};
 use crate::robust::loss::Loss;
 
@@ -277,7 +277,7 @@ impl<T: Real> HomographyModel<T> {
         let h = h * (T::ONE / size);
         let determinant = h.determinant();
         if abs(determinant) > T::EPSILON {
-            Some(Self(if determinant < T::ZERO { -h } else { h }))
+            Some(Self(h * if determinant < T::ZERO { -T::ONE } else { T::ONE }))
         } else {
             None
         }
@@ -340,7 +340,7 @@ impl<T: Real> Manifold<T, 3> for RotationModel<T> {
 
     fn retract(&self, step: &SVector<T, 3>) -> Self {
         let w = Vector3::new(step.data.0[0][0], step.data.0[0][1], step.data.0[0][2]);
-        Self { rotation: cayley(&w) * self.rotation, scales: self.scales }
+        Self { rotation: product(&cayley(&w), &self.rotation), scales: self.scales }
     }
 }
 

@@ -67,16 +67,17 @@ impl<T: Real, const P: usize> NormalEquations<T, P> {
         Self { hessian: SMatrix::zeros(), gradient: SVector::zeros(), cost: T::ZERO, active: 0 }
     }
 
-    /// The step to the minimum, each diagonal element larger by the share `damping`; none where a direction is open. Called
-    /// where code is to be small: its factors take no stack during a pass.
+    /// The step to the minimum, each diagonal element larger by the share `damping`, and by how much it promises to lower
+    /// the cost; none where a direction is open. Called where code is to be small: its factors take no stack during a pass.
     #[cfg_attr(small, inline(never))]
-    fn step(&self, damping: T) -> Option<SVector<T, P>> {
+    pub(crate) fn step(&self, damping: T) -> Option<(SVector<T, P>, T)> {
         let mut damped = self.hessian;
         for p in 0..P {
             let diagonal = damped.data.0[p][p];
             damped.data.0[p][p] = diagonal + damping * diagonal;
         }
-        Ldlt::new(&damped).map(|factors| -factors.solve(&self.gradient))
+        let step = -Ldlt::new(&damped)?.solve(&self.gradient);
+        Some((step, -step.dot(&self.gradient)))
     }
 
     /// Adds those of other correspondences.
@@ -308,13 +309,13 @@ where
         if best.equations.active < least_active {
             break;
         }
-        let Some(step) = best.equations.step(damping) else {
+        let Some((step, promise)) = best.equations.step(damping) else {
             damping *= lit(100.0);
             best.passes += 1;
             continue;
         };
         // What the step promises would not be worth the pass that tells.
-        if -step.dot(&best.equations.gradient) <= tolerance * lit(0.1) * best.equations.cost {
+        if promise <= tolerance * lit(0.1) * best.equations.cost {
             break;
         }
         let model = retract(&best.model, &step);

@@ -7,7 +7,7 @@ use super::lm::{EpipolarModel, Manifold, NormalEquations, Row};
 use crate::Real;
 use crate::geometry::Pose;
 use crate::geometry::pose::{from_parts, tangent_basis};
-use crate::linalg::LANES;
+use crate::linalg::{LANES, product};
 use crate::real::sqrt;
 
 /// A rotation, a unit translation, and the scales between normalised coordinates and the blocks' coordinates.
@@ -155,7 +155,7 @@ impl<T: Real> Manifold<T, 5> for PoseModel<T> {
         let [u, v] = basis.data.0.map(Vector3::from);
         let t = self.translation + u * s[3] + v * s[4];
         Self {
-            rotation: cayley(&Vector3::new(s[0], s[1], s[2])) * self.rotation,
+            rotation: product(&cayley(&Vector3::new(s[0], s[1], s[2])), &self.rotation),
             translation: t * (T::ONE / sqrt(t.norm_squared())),
             scales: self.scales,
         }
@@ -169,7 +169,7 @@ impl<T: Real> EpipolarModel<T, 5> for PoseModel<T> {
         let [u, v] = tangent_basis(&self.translation).data.0.map(Vector3::from);
         let axes = Matrix3::from_columns(&[u, v, self.translation]);
         let (s1, s2) = (self.scales.inverse1(), self.scales.inverse2());
-        let (mut view1, mut view2) = (axes.transpose() * self.rotation, axes);
+        let (mut view1, mut view2) = (product(&axes.transpose(), &self.rotation), axes);
         for i in 0..3 {
             for k in 0..2 {
                 view1.data.0[k][i] *= s1[k];

@@ -12,7 +12,7 @@ use super::lm::NormalEquations;
 use super::relative_pose::cayley;
 use crate::Real;
 use crate::geometry::Pose;
-use crate::geometry::pose::from_parts;
+use crate::geometry::pose::{from_parts, rotation_matrix};
 use crate::linalg::{LANES, Lanes};
 use crate::real::from_u32;
 use crate::robust::loss::Loss;
@@ -29,10 +29,7 @@ pub(crate) struct CameraPose<T: Real> {
 impl<T: Real> CameraPose<T> {
     /// The pose of a solver.
     pub(crate) fn new(pose: &Pose<T>) -> Self {
-        Self {
-            rotation: pose.rotation.to_rotation_matrix().into_inner(),
-            translation: pose.translation.vector,
-        }
+        Self { rotation: rotation_matrix(&pose.rotation), translation: pose.translation.vector }
     }
 
     /// As the public type.

@@ -7,6 +7,7 @@ use super::fundamental::FundamentalModel;
 use super::homography::{HomographyModel, transfer_equations};
 use super::lm::{Manifold, Minimum, NormalEquations, descend, normal_equations};
 use super::relative_pose::{PoseModel, Scales};
+use crate::geometry::pose::rotation_matrix;
 use crate::geometry::{Fundamental, Homography, Pose};
 use crate::input::{check_finite, check_lengths};
 use crate::linalg::{LANES, pieces};
@@ -348,7 +349,7 @@ impl<M, T> RefinedTwoView<M, T> {
 impl<T: Real> PoseModel<T> {
     /// Of a pose with a translation of any length but zero; none where a number is not finite.
     pub(super) fn of(pose: &Pose<T>) -> Option<Self> {
-        let rotation = pose.rotation.to_rotation_matrix().into_inner();
+        let rotation = rotation_matrix(&pose.rotation);
         let t = pose.translation.vector;
         let size = max(abs(t.x), max(abs(t.y), abs(t.z)));
         let t: Vector3<T> = t * (T::ONE / size);

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::Real;
 use crate::geometry::Essential;
 use crate::geometry::pose::nearest_rotation;
-use crate::linalg::{LANES, Lanes, Ldlt};
+use crate::linalg::{LANES, Lanes, cross, times};
 use crate::real::{abs, from_u32, lit, sqrt};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock};
 use crate::refine::homography::{RotationModel, transfer_sq};
@@ -239,9 +239,9 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
                 return None;
             }
             self.add_prior(&mut sums, &model);
-            let step = -Ldlt::new(&sums.hessian)?.solve(&sums.gradient);
+            let (step, promise) = sums.step(T::ZERO)?;
             model = model.retract(&step);
-            if -step.dot(&sums.gradient) <= sums.cost * lit(CONVERGED) {
+            if promise <= sums.cost * lit(CONVERGED) {
                 break;
             }
         }
@@ -382,7 +382,7 @@ fn pose_in_front<T: Real>(
     parallel_sq: T,
 ) -> Option<(Matrix3<T>, Vector3<T>)> {
     let e = &essential.0;
-    let columns = [e.column(0).into_owned(), e.column(1).into_owned(), e.column(2).into_owned()];
+    let columns = e.data.0.map(Vector3::from);
     let products =
         [columns[1].cross(&columns[2]), columns[2].cross(&columns[0]), columns[0].cross(&columns[1])];
     // t is orthogonal to every column: the longest of their cross products.
@@ -401,13 +401,12 @@ fn pose_in_front<T: Real>(
     // With |t| = 1 and E scaled to |E|^2 = 2: R = cof(E) - [t]x E, or with -t.
     let scale = T::ONE / sqrt(size);
     let cofactors = Matrix3::from_columns(&products) * (scale * scale);
-    let turned =
-        Matrix3::from_columns(&[t.cross(&columns[0]), t.cross(&columns[1]), t.cross(&columns[2])]) * scale;
+    let turned = cross(&t, e) * scale;
     for rotation in [cofactors - turned, cofactors + turned] {
         let mut sign = T::ZERO;
         let mut consistent = true;
         for (x1, x2) in f1.iter().zip(f2) {
-            let a = rotation * x1;
+            let a = times(&rotation, x1);
             let (aa, bb, ab) = (a.norm_squared(), x2.norm_squared(), a.dot(x2));
             if aa * bb - ab * ab <= parallel_sq * aa * bb && ab > T::ZERO {
                 continue;

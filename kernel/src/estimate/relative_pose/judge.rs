@@ -10,7 +10,7 @@ use super::hypothesis::{PoseProblem, SAMPLED_BLOCKS};
 use super::verdict::{GeneralMotion, PureRotation, RelativePoseEstimate, RelativePoseVerdict, Unobservable};
 use crate::Real;
 use crate::geometry::Pose;
-use crate::geometry::pose::from_parts;
+use crate::geometry::pose::{from_parts, rotation_matrix};
 use crate::linalg::LANES;
 use crate::real::{from_u32, lit, max, min, sqrt};
 use crate::refine::blocks::EpipolarBlock;
@@ -344,7 +344,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
 
 pub(super) fn pose_model<T: Real, B>(pose: &Pose<T>, problem: &PoseProblem<'_, T, B>) -> PoseModel<T> {
     PoseModel {
-        rotation: pose.rotation.to_rotation_matrix().into_inner(),
+        rotation: rotation_matrix(&pose.rotation),
         translation: pose.translation.vector,
         scales: problem.scales,
     }

@@ -6,8 +6,9 @@ use super::super::scatter::Scatter;
 use super::covariance::planar_covariance;
 use super::judge::{Judge, pose_model};
 use super::verdict::{PlanarPose, RelativePoseEstimate, RelativePoseVerdict};
+use crate::geometry::pose::rotation_matrix;
 use crate::geometry::{Homography, Pose};
-use crate::linalg::{LANES, Ldlt};
+use crate::linalg::{LANES, Ldlt, times};
 use crate::real::{from_u32, is_finite, lit, max, sqrt};
 use crate::refine::blocks::EpipolarBlock;
 use crate::refine::homography::{HomographyModel, transfer_sq};
@@ -97,7 +98,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
             let Some(sample) = sampler.sample::<3>(k) else { break };
             let [Some(a), Some(b), Some(c)] = sample.map(|i| entries.get(i as usize)) else { break };
             let normals = [b.ray.cross(&c.ray), c.ray.cross(&a.ray), a.ray.cross(&b.ray)];
-            let plane = normals[0] * a.value + normals[1] * b.value + normals[2] * c.value;
+            let plane = times(&Matrix3::from_columns(&normals), &Vector3::new(a.value, b.value, c.value));
             let plane = plane * (T::ONE / normals[0].dot(&a.ray));
             let cost = entries.iter().fold(T::ZERO, |sum, entry| {
                 let squared = entry.squared(&plane);
@@ -112,7 +113,11 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         let mut moment = Matrix3::zeros();
         let mut right = Vector3::zeros();
         for entry in entries.iter().filter(|entry| entry.squared(&coarse) < limit * T::TWO) {
-            moment += entry.ray * entry.ray.transpose() * entry.weight;
+            for (column, &x) in moment.data.0.iter_mut().zip(&entry.ray) {
+                for (sum, &y) in column.iter_mut().zip(&entry.ray) {
+                    *sum += y * x * entry.weight;
+                }
+            }
             right += entry.ray * (entry.value * entry.weight);
         }
         let plane = Ldlt::new(&moment)?.solve(&right);
@@ -132,7 +137,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         let ray = Vector3::new(at(0)? * a[0], at(1)? * a[1], T::ONE);
         let seen = Vector3::new(at(2)? * b[0], at(3)? * b[1], T::ONE);
         let t = &pose.translation;
-        let turned = pose.rotation * ray;
+        let turned = times(&pose.rotation, &ray);
         // seen x (turned + value t) = 0 in the least-squares sense.
         let lever = seen.cross(t);
         let value = -lever.dot(&seen.cross(&turned)) / max(lever.norm_squared(), T::MIN_POSITIVE);
@@ -210,7 +215,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         estimate.verdict = RelativePoseVerdict::Planar(Solutions::new());
         let RelativePoseVerdict::Planar(poses) = &mut estimate.verdict else { return };
         for &Twin { pose, normal, ratio, .. } in twins {
-            let rotation = pose.rotation.to_rotation_matrix().into_inner();
+            let rotation = rotation_matrix(&pose.rotation);
             let t = pose.translation.vector * ratio;
             let scales = &self.problem.scales;
             let covariance = scatter

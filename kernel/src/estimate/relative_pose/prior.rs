@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
 use super::super::prior::{Direction, PriorFit};
 use super::verdict::{GeneralMotion, RelativePoseVerdict};
 use crate::Real;
-use crate::geometry::pose::{log, quaternion_from_matrix, skew, tangent_basis};
+use crate::geometry::pose::{log, quaternion_from_matrix, rotation_matrix, skew, tangent_basis};
 use crate::linalg::Ldlt;
 use crate::real::{is_finite, lit, sqrt};
 use crate::refine::lm::NormalEquations;
@@ -126,7 +126,7 @@ impl<T: Real> KnownRotation<T> {
 
     /// How the prior agrees with a rotation of a covariance that was found without it: Wald's test.
     fn fit(&self, rotation: &UnitQuaternion<T>, covariance: &Matrix3<T>) -> PriorFit<T> {
-        let rotation = rotation.to_rotation_matrix().into_inner();
+        let rotation = rotation_matrix(rotation);
         let (square, limit) = match self {
             Self::Gravity { direction, variance } => {
                 let a = rotation * direction.from;

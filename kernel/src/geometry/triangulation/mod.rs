@@ -15,7 +15,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::Pose;
-use super::pose::vector_angle;
+use super::pose::{rotation_matrix, vector_angle};
 use crate::Real;
 use crate::real::{abs, is_finite, lit, max, sqrt};
 
@@ -99,7 +99,7 @@ impl<T: Real> ViewPair<T> {
     #[inline]
     #[must_use]
     pub fn new(pose: &Pose<T>) -> Self {
-        Self::from_parts(&pose.rotation.to_rotation_matrix().into_inner(), &pose.translation.vector)
+        Self::from_parts(&rotation_matrix(&pose.rotation), &pose.translation.vector)
     }
 
     /// The pair of rotation and translation. `r` must be a rotation; it is not checked.
