@@ -44,6 +44,17 @@ pub(crate) fn times<T: Real>(a: &Matrix3<T>, x: &Vector3<T>) -> Vector3<T> {
     a * x
 }
 
+/// `A += s a b'`, by a call where code is to be small.
+#[cfg_attr(not(small), inline(always))]
+#[cfg_attr(small, inline(never))]
+pub(crate) fn add_outer<T: Real>(sum: &mut Matrix3<T>, a: &Vector3<T>, b: &Vector3<T>, s: T) {
+    for j in 0..3 {
+        for i in 0..3 {
+            sum.data.0[j][i] += a.data.0[0][i] * b.data.0[0][j] * s;
+        }
+    }
+}
+
 /// `[v]x A`: the cross products of a vector with the columns of a matrix.
 #[cfg_attr(not(small), inline(always))]
 #[cfg_attr(small, inline(never))]

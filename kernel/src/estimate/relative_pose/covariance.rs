@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::super::scatter::student;
 use crate::Real;
-use crate::geometry::pose::{skew, tangent_basis};
-use crate::linalg::Ldlt;
+use crate::geometry::pose::tangent_basis;
+use crate::linalg::{Ldlt, add_outer, cross};
 use crate::real::{from_u32, lit, max, sqrt};
 use crate::refine::homography::HomographyModel;
 use crate::refine::lm::{NormalEquations, Tangents};
@@ -16,7 +16,13 @@ pub(super) fn covariance<T: Real, const P: usize>(
     sums: &NormalEquations<T, P>,
     variance: T,
 ) -> Option<SMatrix<T, P, P>> {
-    Ldlt::new(&sums.hessian).map(|factors| factors.inverse() * variance)
+    inverse(&sums.hessian, variance)
+}
+
+/// `variance A^-1`; none where A is singular.
+#[cfg_attr(small, inline(never))]
+fn inverse<T: Real, const P: usize>(a: &SMatrix<T, P, P>, variance: T) -> Option<SMatrix<T, P, P>> {
+    Ldlt::new(a).map(|factors| factors.inverse() * variance)
 }
 
 /// Sums over residuals within the support of Tukey's loss: of `r psi`, of `psi^2` and of `psi'`, in units of the support.
@@ -112,18 +118,21 @@ pub(super) fn planar_covariance<T: Real>(
     scales: &Scales<T>,
     variance: T,
 ) -> Option<SMatrix<T, 8, 8>> {
-    let h = scales.transfer(&(rotation + t * n.transpose()));
+    let mut h = *rotation;
+    add_outer(&mut h, t, n, T::ONE);
+    let h = scales.transfer(&h);
     // The model is h scaled to length 1; a step of h moves it by its part orthogonal to h, scaled alike.
     let scale = T::ONE / sqrt(h.norm_squared());
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
     let basis = tangent_basis(n);
     let mut steps = [Matrix3::zeros(); 8];
     for (k, axis) in axes.iter().enumerate() {
-        steps[k] = skew(axis) * rotation;
-        steps[3 + k] = axis * n.transpose();
+        steps[k] = cross(axis, rotation);
+        add_outer(&mut steps[3 + k], axis, n, T::ONE);
     }
-    steps[6] = t * basis.column(0).transpose();
-    steps[7] = t * basis.column(1).transpose();
+    for (step, column) in steps.iter_mut().skip(6).zip(&basis.data.0) {
+        add_outer(step, t, &Vector3::from(*column), T::ONE);
+    }
     let tangents = model.tangents();
     let mut jacobian = SMatrix::<T, 8, 8>::zeros();
     for (q, step) in steps.iter().enumerate() {
@@ -138,6 +147,20 @@ pub(super) fn planar_covariance<T: Real>(
             jacobian.data.0[q][p] = sum;
         }
     }
-    let information = jacobian.transpose() * sums.hessian * jacobian;
-    Ldlt::new(&information).map(|factors| factors.inverse() * variance)
+    // J' H J, row by row.
+    let mut information = SMatrix::<T, 8, 8>::zeros();
+    for p in 0..8 {
+        let mut row = [T::ZERO; 8];
+        for q in 0..8 {
+            for k in 0..8 {
+                row[q] += jacobian.data.0[p][k] * sums.hessian.data.0[q][k];
+            }
+        }
+        for q in 0..8 {
+            for k in 0..8 {
+                information.data.0[q][p] += row[k] * jacobian.data.0[q][k];
+            }
+        }
+    }
+    inverse(&information, variance)
 }

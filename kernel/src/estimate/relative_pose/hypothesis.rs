@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::Real;
 use crate::geometry::Essential;
 use crate::geometry::pose::nearest_rotation;
-use crate::linalg::{LANES, Lanes, cross, times};
+use crate::linalg::{LANES, Lanes, add_outer, cross, times};
 use crate::real::{abs, from_u32, lit, sqrt};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock};
 use crate::refine::homography::{RotationModel, transfer_sq};
@@ -148,7 +148,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
                     if turned[l] {
                         let v1 = Vector3::new(f1[0][l] * s1[0], f1[1][l] * s1[1], f1[2][l]);
                         let v2 = Vector3::new(f2[0][l] * s2[0], f2[1][l] * s2[1], f2[2][l]);
-                        moment += v2 * v1.transpose();
+                        add_outer(&mut moment, &v2, &v1, T::ONE);
                     }
                 }
             });

@@ -8,7 +8,7 @@ use super::judge::{Judge, pose_model};
 use super::verdict::{PlanarPose, RelativePoseEstimate, RelativePoseVerdict};
 use crate::geometry::pose::rotation_matrix;
 use crate::geometry::{Homography, Pose};
-use crate::linalg::{LANES, Ldlt, times};
+use crate::linalg::{LANES, Ldlt, add_outer, times};
 use crate::real::{from_u32, is_finite, lit, max, sqrt};
 use crate::refine::blocks::EpipolarBlock;
 use crate::refine::homography::{HomographyModel, transfer_sq};
@@ -66,7 +66,9 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     pub(super) fn plane(&self, pose: &PoseModel<T>, inliers: &[u32], sigma: T) -> Option<HomographyModel<T>> {
         let threshold = sigma * lit(PLANE_SIGMAS);
         let plane = self.plane_of_three(pose, inliers, threshold)?;
-        let h = pose.scales.transfer(&(pose.rotation + pose.translation * plane.transpose()));
+        let mut h = pose.rotation;
+        add_outer(&mut h, &pose.translation, &plane, T::ONE);
+        let h = pose.scales.transfer(&h);
         let problem = self.transfer_problem(threshold);
         let loss = Loss::Tukey(threshold * T::TWO);
         let start = HomographyModel::new(&h)?;
@@ -113,11 +115,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         let mut moment = Matrix3::zeros();
         let mut right = Vector3::zeros();
         for entry in entries.iter().filter(|entry| entry.squared(&coarse) < limit * T::TWO) {
-            for (column, &x) in moment.data.0.iter_mut().zip(&entry.ray) {
-                for (sum, &y) in column.iter_mut().zip(&entry.ray) {
-                    *sum += y * x * entry.weight;
-                }
-            }
+            add_outer(&mut moment, &entry.ray, &entry.ray, entry.weight);
             right += entry.ray * (entry.value * entry.weight);
         }
         let plane = Ldlt::new(&moment)?.solve(&right);
