@@ -9,6 +9,8 @@ use crate::robust::Sampler;
 
 /// Lines tried, each through two inliers.
 const LINES: u32 = 24;
+/// Where hardly a point may lie off a line, so many more than half of those looked at end the look.
+const FEW_OFF: u32 = 8;
 /// Distinct points looked for at the most.
 const DISTINCT: usize = 12;
 /// Points of repetitions lie within this many standard deviations of each other.
@@ -96,7 +98,7 @@ pub(super) fn on_a_line<T: Real, B: EpipolarBlock<T>>(
     accident: T,
 ) -> bool {
     let outside = (data.count as u32).saturating_sub(inliers.len() as u32);
-    line_with(data, inliers, sigma, &|off| !beyond_chance(outside + off, off, 2, accident))
+    line_with(data, inliers, sigma, FEW_OFF, &|off| !beyond_chance(outside + off, off, 2, accident))
 }
 
 /// True where at least half of all correspondences, and more than chance explains, lie on one line in both views,
@@ -108,14 +110,16 @@ pub(super) fn mostly_on_a_line<T: Real, B: EpipolarBlock<T>>(
 ) -> bool {
     let band = line_accident(data, sigma * lit(EXPLAINED_SIGMAS));
     let count = all.len() as u32;
-    line_with(data, all, sigma, &|off| 2 * off <= count && beyond_chance(count, count - off, 2, band))
+    line_with(data, all, sigma, count, &|off| 2 * off <= count && beyond_chance(count, count - off, 2, band))
 }
 
-/// True where an acceptable number of the inliers lie off some line of least squares.
+/// True where an acceptable number of the inliers lie off some line of least squares. A line through two of them is left as
+/// soon as `patience` more than half of those looked at lie off it.
 fn line_with<T: Real, B: EpipolarBlock<T>>(
     data: BlockSlice<'_, B>,
     inliers: &[u32],
     sigma: T,
+    patience: u32,
     acceptable: &dyn Fn(u32) -> bool,
 ) -> bool {
     let total = inliers.len() as u32;
@@ -126,7 +130,7 @@ fn line_with<T: Real, B: EpipolarBlock<T>>(
         let end = |i: u32| inliers.get(i as usize).and_then(|&i| point(data, i));
         let (Some(a), Some(b)) = (end(i), end(j)) else { continue };
         let first = through(&a, &b);
-        if off_line(data, inliers, &first, limit * lit(9.0), total / 2) > total / 2 {
+        if off_line(data, inliers, &first, limit * lit(9.0), patience) > total / 2 {
             continue;
         }
         // Two noisy points give a coarse line; all near it give a good one.
@@ -139,21 +143,21 @@ fn line_with<T: Real, B: EpipolarBlock<T>>(
     false
 }
 
-/// How many inliers do not lie on the line in both views; counting ends beyond `most`, so that an ordinary scene is soon
-/// done.
+/// How many inliers do not lie on the line in both views; all where `patience` more than half of those looked at do not, so
+/// that an ordinary scene is soon done.
 fn off_line<T: Real, B: EpipolarBlock<T>>(
     data: BlockSlice<'_, B>,
     inliers: &[u32],
     line: &Line<T>,
     limit: T,
-    most: u32,
+    patience: u32,
 ) -> u32 {
     let mut off = 0;
-    for &index in inliers {
+    for (&index, seen) in inliers.iter().zip(0u32..) {
         let on = point(data, index).is_some_and(|p| distances_sq(&p, line).iter().all(|d| *d < limit));
         off += !on as u32;
-        if off > most {
-            break;
+        if off > patience && off - patience > seen / 2 {
+            return inliers.len() as u32;
         }
     }
     off
@@ -171,7 +175,7 @@ pub(super) fn few_distinct<T: Real, B: EpipolarBlock<T>>(
     let mut centres = [[T::ZERO; 4]; DISTINCT];
     let mut sizes = [0u32; DISTINCT];
     let mut used = 0usize;
-    let mut many = false;
+    let mut more = 0u32;
     let mut total = 0u32;
     for index in inliers {
         let Some(p) = point(data, index) else { continue };
@@ -194,10 +198,16 @@ pub(super) fn few_distinct<T: Real, B: EpipolarBlock<T>>(
                 *size = 1;
                 used += 1;
             }
-            // Points beyond the list's end count as not repeated.
-            _ => many = true,
+            // Points beyond the list's end count as not repeated: with more than one in ten a pose is settled (below).
+            _ => {
+                more += 1;
+                if needed == 5 && more > data.count as u32 / 10 {
+                    return false;
+                }
+            }
         }
     }
+    let many = more > 0;
     // A model through repeated points can be bent to meet some accidents: nine in ten are too many.
     let mut falling = [0u32; DISTINCT];
     for mut size in sizes {

@@ -14,7 +14,8 @@ pub struct RansacOptions<T> {
     /// pose takes up to five times as many samples, until three of them have led to the same best optimum.
     /// Default 0.999.
     pub confidence: T,
-    /// Iterations made at the least, so that one lucky sample does not end the run. Default 20.
+    /// Iterations made at the least, so that one lucky sample does not end the run. Default 20. A relative pose with a prior
+    /// makes fewer, of as many correspondences altogether.
     pub min_iterations: u32,
     /// What the run may spend at the most. Default: 10,000 iterations, everything else unlimited.
     pub budget: Budget,

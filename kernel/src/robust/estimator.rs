@@ -48,6 +48,11 @@ pub trait Estimator<T: Real, const S: usize> {
     /// The model after local optimisation on its inliers; none where that failed. Adds the residuals evaluated.
     fn refine(&self, model: &Self::Model, residuals: &mut u64) -> Option<Self::Model>;
 
+    /// True where a sample is not worth its model, because it would lead to `best`, the best model so far, again.
+    fn repeats(&self, _sample: &[u32; S], _best: &Self::Model) -> bool {
+        false
+    }
+
     /// True where more samples would lead to a model that is no better than this one, the best so far, for what all of
     /// them tell: then [`DISCOVERIES`](Self::DISCOVERIES) asks for no more. Adds the residuals evaluated.
     fn settles(&self, _model: &Self::Model, _residuals: &mut u64) -> bool {

@@ -11,6 +11,8 @@ use crate::real::{abs, from_u32, lit, max, min};
 /// A sample's best hypothesis is optimised where it explains this share of what the best minimal model does: the
 /// best minimal model need not lie in the best basin.
 const SLACK: f64 = 0.7;
+/// Where the best minimal model explains no more than chance, one in as many near misses is optimised.
+const DOUBTFUL: u32 = 4;
 /// Until the best optimum has been met [`Estimator::DISCOVERIES`] times (half as many where most agree with it and nothing
 /// rivals it), the run lasts so many times as long.
 const PATIENCE: u32 = 5;
@@ -33,7 +35,8 @@ pub struct Consensus<M, T> {
 
 /// The consensus of an estimator's correspondences.
 ///
-/// The best hypothesis of a sample is optimised locally where it comes near the best minimal model so far; the run
+/// The best hypothesis of a sample is optimised locally where it comes near the best minimal model so far (more rarely
+/// until that one explains more than chance); the run
 /// ends once samples enough for the inliers of the best optimised model have been drawn. Where samples lead to different
 /// optima, one sample of inliers is not enough: until [`Estimator::DISCOVERIES`] of them have led to the best one (half as
 /// many where most correspondences agree with it and no other optimum came near), five times as many samples are asked
@@ -120,6 +123,9 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
     let mut best: Option<(E::Model, Score<T>)> = None;
     let mut sample = [0; S];
     while search.next(&mut sample, &mut keep_going) {
+        if best.is_some_and(|(model, _)| estimator.repeats(&sample, &model)) {
+            continue;
+        }
         let bound = search.bound();
         let mut leader: Option<(E::Model, Score<T>)> = None;
         let solved = estimator.generate(&sample, &mut |model| {
@@ -293,8 +299,17 @@ impl<'a, T: Real> Search<'a, T> {
         let (all, least) = (from_u32::<T>(self.count), self.minimal.cost);
         let later = self.spent.iterations.checked_div(self.manners.near_miss_interval).unwrap_or(0);
         let limit = self.manners.near_misses + later;
+        let limit = if self.beats_chance() { limit } else { limit / DOUBTFUL };
         let near = least < T::MAX && self.spent.refinements < limit;
         if near { all - (all - least) * lit(SLACK) } else { least }
+    }
+
+    /// True where more correspondences agree with the best minimal model than with the best of many wrong ones, which is their
+    /// sample and three standard deviations more of the rest than with any of them.
+    fn beats_chance(&self) -> bool {
+        let expected = from_u32::<T>(self.count) * wrong_share(&self.counts);
+        let excess = from_u32::<T>(self.minimal.inliers) - from_u32(self.size) - expected;
+        excess > T::ZERO && excess * excess > expected * lit(9.0)
     }
 
     /// Whether another hypothesis is looked at, which is then counted.
@@ -358,17 +373,20 @@ impl<'a, T: Real> Search<'a, T> {
     }
 }
 
-/// The sequential test between `inliers` of `count` and the share of inliers that rejected models had so far.
+/// The sequential test between `inliers` of `count` and the share of inliers of wrong models.
 fn gate<T: Real>(bound: T, inliers: u32, count: u32, counts: &ScoreCounts) -> Gate<T> {
+    Gate::new(bound, from_u32::<T>(inliers) / from_u32(core::cmp::max(count, 1)), wrong_share(counts))
+}
+
+/// The share of inliers that rejected models had so far, within what separates right from wrong; 5 % before enough is
+/// known.
+fn wrong_share<T: Real>(counts: &ScoreCounts) -> T {
+    if counts.rejected_residuals < 500 {
+        return lit(0.05);
+    }
     // Halved until they fit 32 bits.
     let halvings = 32u32.saturating_sub(counts.rejected_residuals.leading_zeros());
-    let ratio = |a: u32, b: u32| from_u32::<T>(a) / from_u32::<T>(b);
-    // Before enough is known, 5 %; a measured share is kept within what separates right from wrong.
-    let bad = if counts.rejected_residuals < 500 {
-        lit(0.05)
-    } else {
-        let share = |n: u64| (n >> halvings) as u32;
-        min(ratio(share(counts.rejected_inliers), share(counts.rejected_residuals)), lit(0.5))
-    };
-    Gate::new(bound, ratio(inliers, core::cmp::max(count, 1)), max(bad, lit(0.01)))
+    let share = |n: u64| from_u32::<T>((n >> halvings) as u32);
+    let share = share(counts.rejected_inliers) / share(counts.rejected_residuals);
+    max(min(share, lit(0.5)), lit(0.01))
 }

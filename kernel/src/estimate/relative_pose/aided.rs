@@ -10,7 +10,7 @@ use super::super::chance::line_accident;
 use super::super::prior::PriorFit;
 use super::LEAST_INLIERS;
 use super::hypothesis::{PoseProblem, repeated};
-use super::judge::{Judge, pose_model};
+use super::judge::Judge;
 use super::prior::KnownRotation;
 use super::verdict::{RelativePoseEstimate, RelativePoseVerdict};
 use crate::Real;
@@ -28,8 +28,6 @@ use crate::solvers::{relpose_upright_3pt, translation_2pt};
 
 /// Blocks of the correspondences on which hypotheses are polished.
 const SUBSET: usize = 8;
-/// Passes over the data that lead from the pose with a prior to that without it: a step that fits is a small one.
-const UNAIDED_PASSES: u32 = 3;
 /// Passes over the data in a local optimisation.
 const LOCAL_PASSES: u32 = 6;
 /// The wide threshold is the narrow one and so many standard deviations of the prior.
@@ -190,6 +188,11 @@ impl<T: Real, B: EpipolarBlock<T>, K: Minimal<T, S>, const S: usize> Estimator<T
         self.problem.score(model, gate, counts)
     }
 
+    fn repeats(&self, sample: &[u32; S], best: &PoseModel<T>) -> bool {
+        // What a sample of inliers leads to is the optimum among them.
+        sample.iter().all(|&index| self.problem.explains(best, index))
+    }
+
     fn refine(&self, model: &PoseModel<T>, residuals: &mut u64) -> Option<PoseModel<T>> {
         // A polished model needs no wide stage.
         let loss = Loss::Tukey(self.problem.threshold * T::TWO);
@@ -212,19 +215,23 @@ fn search<T: Real, B: EpipolarBlock<T>>(
     let count = problem.data.count as u32;
     let least = core::cmp::max((from_u32::<T>(count) * lit(LEAST_SHARE)).to_u32(), LEAST_INLIERS);
     let mut options = *options;
-    let limit = |size: u32| {
-        core::cmp::max(iterations_needed(options.confidence, least, count, size), options.min_iterations)
+    // As many correspondences in the fewest samples as without the prior.
+    let size = match known {
+        KnownRotation::Gravity { .. } => 3,
+        KnownRotation::Rotation { .. } => 2,
     };
-    let budget = &mut options.budget;
+    let floor = options.min_iterations.saturating_mul(size).div_ceil(5);
+    let most =
+        core::cmp::max(iterations_needed(options.confidence, least, count, size), options.min_iterations);
+    options.min_iterations = floor;
+    options.budget.max_iterations = core::cmp::min(options.budget.max_iterations, most);
     match known {
         KnownRotation::Gravity { direction, .. } => {
-            budget.max_iterations = core::cmp::min(budget.max_iterations, limit(3));
             let turns = Upright([upright(&direction.from)?, upright(&direction.to)?]);
             let aided = AidedProblem::new(problem, known.variance(), turns)?;
             Some(ransac::<T, _, 3>(&aided, &options, order, LEAST_INLIERS, keep_going))
         }
         KnownRotation::Rotation { rotation, .. } => {
-            budget.max_iterations = core::cmp::min(budget.max_iterations, limit(2));
             let aided = AidedProblem::new(problem, known.variance(), Turned(*rotation))?;
             Some(ransac::<T, _, 2>(&aided, &options, order, LEAST_INLIERS, keep_going))
         }
@@ -255,7 +262,9 @@ pub(super) fn judge<T: Real, B: EpipolarBlock<T>>(
     let confident = first.filter(|first| first.report.stop == StopReason::Confident);
     if let Some(first) = confident {
         aided.judge(&first, mask, order, estimate);
-        estimate.prior = agreement(plain, known, &estimate.verdict);
+        if !matches!(estimate.verdict, RelativePoseVerdict::General(_)) {
+            estimate.prior = known.agreement(&estimate.verdict);
+        }
         if let Some(PriorFit::Fits(_)) = estimate.prior {
             let ask = keep_going.as_mut().map(|ask| &mut **ask as &mut dyn FnMut(&_) -> bool);
             let rival = rival(plain.problem, &first, options, ask);
@@ -289,7 +298,9 @@ pub(super) fn judge<T: Real, B: EpipolarBlock<T>>(
         && first.report.cost < second.report.cost
     {
         aided.judge(&first, mask, order, estimate);
-        estimate.prior = agreement(plain, known, &estimate.verdict);
+        if !matches!(estimate.verdict, RelativePoseVerdict::General(_)) {
+            estimate.prior = known.agreement(&estimate.verdict);
+        }
         if let Some(PriorFit::Fits(_)) = estimate.prior {
             estimate.report = total(first.report);
             return;
@@ -297,10 +308,11 @@ pub(super) fn judge<T: Real, B: EpipolarBlock<T>>(
     }
     estimate.report = total(second.report);
     plain.judge(&second, mask, order, estimate);
-    estimate.prior = known.agreement(&estimate.verdict);
-    if let Some(PriorFit::Fits(_)) = estimate.prior {
+    let fit = known.agreement(&estimate.verdict);
+    if let Some(PriorFit::Fits(_)) = fit {
         aided.judge(&second, mask, order, estimate);
     }
+    estimate.prior = fit;
 }
 
 /// A short search without the prior for a consensus half as large again: a wrong prior may have led to a pose that a part
@@ -320,22 +332,6 @@ fn rival<T: Real, B: EpipolarBlock<T>>(
         if inliers < count { iterations_needed::<T>(lit(RIVAL_CONFIDENCE), inliers, count, 5) } else { 0 };
     options.budget.max_iterations = core::cmp::min(options.budget.max_iterations, needed);
     ransac::<T, _, 5>(problem, &options, None, inliers, keep_going).report
-}
-
-/// How the prior agrees with a verdict in which it took part: with what the same correspondences say without it.
-fn agreement<T: Real, B: EpipolarBlock<T>>(
-    plain: &Judge<'_, '_, T, B>,
-    known: &KnownRotation<T>,
-    verdict: &RelativePoseVerdict<T>,
-) -> Option<PriorFit<T>> {
-    match verdict {
-        RelativePoseVerdict::General(motion) => {
-            let model = plain.refine(&pose_model(&motion.pose, plain.problem), UNAIDED_PASSES);
-            let (motion, _) = plain.motion(&model, plain.noise(&model));
-            known.agreement(&RelativePoseVerdict::General(motion))
-        }
-        verdict => known.agreement(verdict),
-    }
 }
 
 /// The order of the correspondences by their scores, in the memory given.

@@ -47,7 +47,7 @@ const CONVERGED: f64 = 0.01;
 /// Blocks that a local optimisation looks at.
 pub(super) const SAMPLED_BLOCKS: usize = 64;
 /// Blocks on which it is tried whether a pose is but a rotation.
-const TURNED_BLOCKS: usize = 16;
+pub(super) const TURNED_BLOCKS: usize = 8;
 /// Passes over those at the most.
 const TURN_PASSES: u64 = TURN_SIGMAS.len() as u64 + 1;
 /// Errors, in standard deviations, up to which correspondences take part in the next rotation: from coarse to fine, so that
@@ -134,9 +134,15 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
     }
 
     /// The rotation that explains the inliers of a pose best, by alternating between the closest rotation of all that are
-    /// explained and the choice of those, on so many of the `blocks`; none where they leave one open, or where less than half
-    /// of them turn.
-    pub(super) fn rotation(&self, pose: &PoseModel<T>, sigma: T, blocks: usize) -> Option<RotationModel<T>> {
+    /// explained and the choice of those, on so many of the `blocks`; none where they leave one open, or where less than one in
+    /// `share` of them turns.
+    pub(super) fn rotation(
+        &self,
+        pose: &PoseModel<T>,
+        sigma: T,
+        blocks: usize,
+        share: u32,
+    ) -> Option<RotationModel<T>> {
         let mut model = RotationModel { rotation: pose.rotation, scales: pose.scales };
         let (s1, s2) = (pose.scales.inverse1(), pose.scales.inverse2());
         let mut limit: T = T::MAX;
@@ -152,7 +158,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
                     }
                 }
             });
-            if 2 * turned < inliers {
+            if share * turned < inliers {
                 return None;
             }
             model.rotation = nearest_rotation(&moment)?;
@@ -198,12 +204,20 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
     /// others.
     fn turns(&self, pose: &PoseModel<T>) -> bool {
         // A threshold is two standard deviations.
-        let Some(rotation) = self.rotation(pose, self.threshold * T::HALF, TURNED_BLOCKS) else {
+        let Some(rotation) = self.rotation(pose, self.threshold * T::HALF, TURNED_BLOCKS, 2) else {
             return false;
         };
         let limit = self.threshold * self.threshold * lit(EXPLAINED_SIGMAS * EXPLAINED_SIGMAS * 0.25);
         let (inliers, turned) = self.turned(pose, &rotation, limit, TURNED_BLOCKS, |_, _| ());
         turned * 10 >= inliers * 9
+    }
+
+    /// Whether a correspondence is an inlier of a model.
+    pub(super) fn explains(&self, model: &PoseModel<T>, index: u32) -> bool {
+        let Some(block) = self.data.blocks.get(index as usize / LANES) else { return false };
+        let frame = model.frame();
+        let sight = block.sight(&frame.views, index as usize % LANES);
+        sight.c * sight.c < self.threshold * self.threshold * sight.d && sight.in_front(frame.parallel_sq)
     }
 
     /// How many correspondences of whole blocks lie within a threshold of a model, in front of the cameras or not.

@@ -4,9 +4,10 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::super::chance::{ACCIDENTS, EXPLAINED_SIGMAS, beyond_chance, line_accident};
 use super::super::degenerate::{few_distinct, list, on_a_line};
+use super::super::prior::PriorFit;
 use super::covariance::{PsiSums, covariance, variance};
 use super::evidence::{Evidence, Explained};
-use super::hypothesis::{PoseProblem, SAMPLED_BLOCKS};
+use super::hypothesis::{PoseProblem, SAMPLED_BLOCKS, TURNED_BLOCKS};
 use super::verdict::{GeneralMotion, PureRotation, RelativePoseEstimate, RelativePoseVerdict, Unobservable};
 use crate::Real;
 use crate::geometry::Pose;
@@ -46,6 +47,10 @@ const TWIN_PASSES: u32 = 4;
 /// A plane must explain so many in twenty of the pose's inliers to be the verdict; of a planar scene it explains all but
 /// accidents.
 const PLANE_SHARE_OF_20: u32 = 17;
+/// Before it is refined to the end, so many.
+const LEAST_SHARE_OF_20: u32 = 13;
+/// A twin so close to the pose (squared distance of its rotation and translation, rad) leads back to it.
+const SAME_POSE_SQ: f64 = 0.0005;
 /// Accidents expected at the most where parallax counts as proven against a rotation: where it is hardly visible a general
 /// pose has no direction, so that little is lost.
 const ROTATION_ACCIDENTS: f64 = 1e-4;
@@ -60,8 +65,8 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         line_accident(self.problem.data, self.problem.threshold)
     }
 
-    /// Writes verdict and noise, in the blocks' unit, of what a search found (in place, for a verdict is large), and the
-    /// inlier mask; uses `order` as memory.
+    /// Writes verdict and noise, in the blocks' unit, of what a search found (in place, for a verdict is large), how a prior
+    /// that took part agrees with a general motion, and the inlier mask; uses `order` as memory.
     pub(super) fn judge(
         &self,
         consensus: &Consensus<PoseModel<T>, T>,
@@ -134,47 +139,70 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
             let still = RotationModel { rotation: Matrix3::identity(), scales: problem.scales };
             return self.turned(&still, true, self.least_motion / lit(EXPLAINED_SIGMAS), mask, estimate);
         }
-        if let Some(rotation) = problem.rotation(&refined, sigma, SAMPLED_BLOCKS) {
+        // Where most correspondences agree, a few of them tell that it is no rotation, and the pose and its plane are known well
+        // after few passes.
+        let clear = 2 * inliers > count;
+        if (!clear || problem.rotation(&refined, sigma, 2 * TURNED_BLOCKS, 4).is_some())
+            && let Some(rotation) = problem.rotation(&refined, sigma, SAMPLED_BLOCKS, 2)
+        {
             let explained = evidence.explained(&rotation.matrix());
             if !evidence.proves_parallax(count, &explained, 3, lit(ROTATION_ACCIDENTS)) {
                 let still = self.stands_still(&evidence, &rotation, &explained);
                 return self.turned(&rotation, still, sigma, mask, estimate);
             }
         }
-        if let Some(plane) = self.plane(&refined, indices, sigma)
-            && 2 * evidence.explained(&plane.0).inliers > inliers
-        {
-            // A plane that holds most inliers may have led to the wrong one of its two poses.
-            let twins = self.twins(&plane);
-            let mut least = self.cost(&refined);
-            for twin in &twins {
-                // Few passes tell whether it comes near the pose.
-                let near = self.refine(&pose_model(&twin.pose, problem), TWIN_PASSES);
-                if self.cost(&near) < least + T::ONE {
-                    let other = self.refine(&near, REFINE_PASSES);
-                    let cost = self.cost(&other);
-                    if cost < least {
-                        (refined, least) = (other, cost);
+        if let Some(mut plane) = self.plane(&refined, indices, sigma, clear) {
+            let held = evidence.explained(&plane.0).inliers;
+            let planar = 20 * held > inliers * LEAST_SHARE_OF_20;
+            if planar && clear {
+                plane = self.finer(&plane, sigma);
+            }
+            if 2 * held > inliers {
+                // A plane that holds most inliers may have led to the wrong one of its two poses.
+                let twins = self.twins(&plane);
+                let mut least = self.cost(&refined);
+                let leads_back = |twin: &PoseModel<T>| {
+                    let turn = (twin.rotation - refined.rotation).norm_squared() * T::HALF;
+                    turn + (twin.translation - refined.translation).norm_squared() < lit(SAME_POSE_SQ)
+                };
+                let mut better = None;
+                for twin in &twins {
+                    let twin = pose_model(&twin.pose, problem);
+                    if clear && leads_back(&twin) {
+                        continue;
+                    }
+                    // Few passes tell whether it comes near the pose.
+                    let near = self.refine(&twin, TWIN_PASSES);
+                    if self.cost(&near) < least + T::ONE {
+                        let other = self.refine(&near, REFINE_PASSES);
+                        let cost = self.cost(&other);
+                        if cost < least {
+                            (better, least) = (Some(other), cost);
+                        }
+                    }
+                }
+                if let Some(better) = better {
+                    refined = better;
+                    noise = self.mark(&refined, mask).1;
+                }
+                if planar && let Some(twin) = twins.first() {
+                    // The plane's own lines: those of the pose are the ones that the noise happens to lie along.
+                    let epipolar = pose_model(&twin.pose, problem).matrix();
+                    let evidence = Evidence { problem, inliers: mask, epipolar, sigma, accident };
+                    let explained = evidence.explained(&plane.0);
+                    let share =
+                        explained.inliers * 20 >= (explained.inliers + explained.others) * PLANE_SHARE_OF_20;
+                    let bends = evidence.bends(&plane.0, &refined.matrix(), max(noise, sigma * T::HALF));
+                    if share && !bends && !evidence.proves_parallax(count, &explained, 8, lit(ACCIDENTS)) {
+                        return self.planar(&plane, &twins, sigma, mask, estimate);
                     }
                 }
             }
-            noise = self.mark(&refined, mask).1;
-            if let Some(twin) = twins.first() {
-                // The plane's own lines: those of the pose are the ones that the noise happens to lie along.
-                let epipolar = pose_model(&twin.pose, problem).matrix();
-                let evidence = Evidence { problem, inliers: mask, epipolar, sigma, accident };
-                let explained = evidence.explained(&plane.0);
-                let share =
-                    explained.inliers * 20 >= (explained.inliers + explained.others) * PLANE_SHARE_OF_20;
-                let bends = evidence.bends(&plane.0, &refined.matrix(), max(noise, sigma * T::HALF));
-                if share && !bends && !evidence.proves_parallax(count, &explained, 8, lit(ACCIDENTS)) {
-                    return self.planar(&plane, &twins, sigma, mask, estimate);
-                }
-            }
         }
-        let (motion, noise) = self.motion(&refined, noise);
+        let (motion, noise, fit) = self.motion(&refined, noise);
         estimate.verdict = RelativePoseVerdict::General(motion);
         estimate.noise_px = noise;
+        estimate.prior = fit;
     }
 
     /// The pose that all inliers support, with what lies just beyond the threshold at a falling weight.
@@ -202,16 +230,19 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         motion.covariance.map(|_| motion)
     }
 
-    /// A refined pose with its covariance, and the noise more precisely.
-    pub(super) fn motion(&self, model: &PoseModel<T>, noise: T) -> (GeneralMotion<T>, T) {
+    /// A refined pose with its covariance, the noise more precisely, and how a prior that took part agrees.
+    fn motion(&self, model: &PoseModel<T>, noise: T) -> (GeneralMotion<T>, T, Option<PriorFit<T>>) {
         let support = self.support(noise);
         let spread = self.sums(model, support).spread(support, 5);
         let loss = Loss::Truncated(support);
         let mut sums = normal_equations(self.problem.data, model, &loss);
+        let mut fit = None;
         if let Some((known, _)) = &self.problem.prior {
+            fit = known.agreement(&sums, &model.rotation, spread.variance);
             known.add(&mut sums, &model.rotation, spread.variance);
         }
-        (GeneralMotion { pose: model.pose(), covariance: covariance(&sums, spread.variance) }, spread.noise)
+        let covariance = covariance(&sums, spread.variance);
+        (GeneralMotion { pose: model.pose(), covariance }, spread.noise, fit)
     }
 
     /// Where the loss about a pose ends: as far as the noise of these correspondences reaches.
@@ -282,13 +313,24 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         if !(sigma > T::ZERO) {
             return false;
         }
-        let displaced_below = |sigma: T| Evidence { sigma, ..*evidence }.explained(&still);
-        let near = displaced_below(sigma);
-        if 2 * near.all < self.problem.data.count as u32 {
+        if 2 * self.displaced_below(&still, self.least_motion) < self.problem.data.count as u32 {
             return false;
         }
-        let far = displaced_below(sigma * T::TWO);
+        let far = Evidence { sigma: sigma * T::TWO, ..*evidence }.explained(&still);
         MOVED_ONE_IN * far.others <= far.inliers + far.others
+    }
+
+    /// How many correspondences a model displaces by less than `limit`.
+    fn displaced_below(&self, model: &Matrix3<T>, limit: T) -> u32 {
+        let limit = limit * limit;
+        let (mut near, mut left) = (0, self.problem.data.count);
+        for block in self.problem.data.blocks {
+            let (plane, weight) = block.planes();
+            let squared = transfer_sq(model, &plane, &weight);
+            near += squared.iter().take(left).map(|&s| (s < limit) as u32).sum::<u32>();
+            left = left.saturating_sub(LANES);
+        }
+        near
     }
 
     /// True where a rotation moves the points by no more than the noise.

@@ -21,6 +21,8 @@ use crate::{Real, Solutions};
 /// many; passes over the data of the refinement at the most.
 const PLANE_SIGMAS: f64 = 3.5;
 const PLANE_PASSES: u32 = 12;
+/// Passes after which a plane's inliers are known well enough.
+const COARSE_PASSES: u32 = 3;
 
 /// Inliers among which a plane is looked for, and planes through three of them that are tried: of a plane that holds half
 /// of them 995 in 1,000 are found.
@@ -62,17 +64,39 @@ pub(super) struct Twin<T: Real> {
 }
 
 impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
-    /// The plane that holds the most inliers of a pose, refined; none where less than half of them may lie on one.
-    pub(super) fn plane(&self, pose: &PoseModel<T>, inliers: &[u32], sigma: T) -> Option<HomographyModel<T>> {
-        let threshold = sigma * lit(PLANE_SIGMAS);
-        let plane = self.plane_of_three(pose, inliers, threshold)?;
+    /// The plane that holds the most inliers of a pose, refined, for a look at its inliers by `few` passes; none where less
+    /// than half of them may lie on one.
+    pub(super) fn plane(
+        &self,
+        pose: &PoseModel<T>,
+        inliers: &[u32],
+        sigma: T,
+        few: bool,
+    ) -> Option<HomographyModel<T>> {
+        let plane = self.plane_of_three(pose, inliers, sigma * lit(PLANE_SIGMAS))?;
         let mut h = pose.rotation;
         add_outer(&mut h, &pose.translation, &plane, T::ONE);
         let h = pose.scales.transfer(&h);
-        let problem = self.transfer_problem(threshold);
+        let (passes, tolerance) = if few { (COARSE_PASSES, lit(1e-2)) } else { (PLANE_PASSES, lit(1e-6)) };
+        Some(self.refined_plane(&HomographyModel::new(&h)?, sigma, passes, tolerance))
+    }
+
+    /// A plane at its optimum.
+    pub(super) fn finer(&self, plane: &HomographyModel<T>, sigma: T) -> HomographyModel<T> {
+        self.refined_plane(plane, sigma, PLANE_PASSES, lit(1e-6))
+    }
+
+    fn refined_plane(
+        &self,
+        plane: &HomographyModel<T>,
+        sigma: T,
+        passes: u32,
+        tolerance: T,
+    ) -> HomographyModel<T> {
+        let threshold = sigma * lit(PLANE_SIGMAS);
         let loss = Loss::Tukey(threshold * T::TWO);
-        let start = HomographyModel::new(&h)?;
-        HomographyModel::new(&problem.optimise(&start, &loss, PLANE_PASSES, lit(1e-6)).model.0)
+        let refined = self.transfer_problem(threshold).optimise(plane, &loss, passes, tolerance);
+        HomographyModel::new(&refined.model.0).unwrap_or(*plane)
     }
 
     /// The plane `p' X1 = 1` that holds the most of some inliers of a pose, fitted to those near the best one of three.
@@ -94,6 +118,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         let entries = entries.get(..used).unwrap_or_default();
         // Noise of both views.
         let limit = threshold * threshold * T::TWO;
+        let scale = T::ONE / limit;
         let mut sampler = Sampler::<T>::uniform(self.seed, used as u32);
         let mut best = (from_u32::<T>(used as u32), None);
         for k in 0..PLANES {
@@ -102,10 +127,15 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
             let normals = [b.ray.cross(&c.ray), c.ray.cross(&a.ray), a.ray.cross(&b.ray)];
             let plane = times(&Matrix3::from_columns(&normals), &Vector3::new(a.value, b.value, c.value));
             let plane = plane * (T::ONE / normals[0].dot(&a.ray));
-            let cost = entries.iter().fold(T::ZERO, |sum, entry| {
-                let squared = entry.squared(&plane);
-                sum + if squared < limit { squared / limit } else { T::ONE }
-            });
+            let mut cost = T::ZERO;
+            for entry in entries {
+                let share = entry.squared(&plane) * scale;
+                cost += if share < T::ONE { share } else { T::ONE };
+                // No longer the best.
+                if !(cost < best.0) {
+                    break;
+                }
+            }
             if cost < best.0 {
                 best = (cost, Some(plane));
             }

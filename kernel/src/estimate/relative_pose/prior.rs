@@ -9,6 +9,7 @@ use crate::geometry::pose::{log, quaternion_from_matrix, rotation_matrix, skew, 
 use crate::linalg::Ldlt;
 use crate::real::{is_finite, lit, sqrt};
 use crate::refine::lm::NormalEquations;
+use crate::refine::relative_pose::cayley;
 
 /// What is known of a relative pose before its images are looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,6 +45,14 @@ pub(super) trait RotationPrior<T: Real> {
     fn add(&self, sums: &mut NormalEquations<T, 5>, rotation: &Matrix3<T>, variance: T);
     /// The squared deviation of a rotation from the prior, in units of the prior's covariance.
     fn cost(&self, rotation: &Matrix3<T>) -> T;
+    /// How the prior agrees with what the correspondences say without it: by the step from a pose in which it took part that
+    /// their equations alone ask for; none where they leave a direction open.
+    fn agreement(
+        &self,
+        alone: &NormalEquations<T, 5>,
+        rotation: &Matrix3<T>,
+        variance: T,
+    ) -> Option<PriorFit<T>>;
 }
 
 /// A prior that has been checked.
@@ -88,6 +97,20 @@ impl<T: Real> RotationPrior<T> for KnownRotation<T> {
             }
         }
     }
+
+    fn agreement(
+        &self,
+        alone: &NormalEquations<T, 5>,
+        rotation: &Matrix3<T>,
+        variance: T,
+    ) -> Option<PriorFit<T>> {
+        let factors = Ldlt::new(&alone.hessian)?;
+        let step = -factors.solve(&alone.gradient);
+        let [x, y, z, ..] = step.data.0[0];
+        let rotation = cayley(&Vector3::new(x, y, z)) * rotation;
+        let covariance = rotation_block(&(factors.inverse() * variance));
+        Some(self.fit(&rotation, &covariance))
+    }
 }
 
 impl<T: Real> KnownRotation<T> {
@@ -125,8 +148,7 @@ impl<T: Real> KnownRotation<T> {
     }
 
     /// How the prior agrees with a rotation of a covariance that was found without it: Wald's test.
-    fn fit(&self, rotation: &UnitQuaternion<T>, covariance: &Matrix3<T>) -> PriorFit<T> {
-        let rotation = rotation_matrix(rotation);
+    fn fit(&self, rotation: &Matrix3<T>, covariance: &Matrix3<T>) -> PriorFit<T> {
         let (square, limit) = match self {
             Self::Gravity { direction, variance } => {
                 let a = rotation * direction.from;
@@ -142,7 +164,7 @@ impl<T: Real> KnownRotation<T> {
                 (square.filter(|_| ahead > T::ZERO), lit(LIMIT_SQ_GRAVITY))
             }
             Self::Rotation { rotation: known, covariance: own, .. } => {
-                let e = turn(&rotation, known);
+                let e = turn(rotation, known);
                 let square = Ldlt::new(&(own + covariance)).map(|factors| e.dot(&factors.solve(&e)));
                 (square, lit(LIMIT_SQ_ROTATION))
             }
@@ -166,7 +188,8 @@ impl<T: Real> KnownRotation<T> {
         rotation: &UnitQuaternion<T>,
         covariance: &Option<SMatrix<T, P, P>>,
     ) -> Option<PriorFit<T>> {
-        covariance.as_ref().map(|covariance| self.fit(rotation, &rotation_block(covariance)))
+        let rotation = rotation_matrix(rotation);
+        covariance.as_ref().map(|covariance| self.fit(&rotation, &rotation_block(covariance)))
     }
 
     /// How the prior agrees with a verdict that was found without it; none where the verdict knows of no rotation.
@@ -185,15 +208,7 @@ impl<T: Real> KnownRotation<T> {
                     .fold(None, nearer)
             }
             RelativePoseVerdict::PureRotation(found) => self.fit_of(&found.rotation, &found.covariance),
-            RelativePoseVerdict::NoMotion => {
-                let identity = UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(
-                    T::ONE,
-                    T::ZERO,
-                    T::ZERO,
-                    T::ZERO,
-                ));
-                Some(self.fit(&identity, &Matrix3::zeros()))
-            }
+            RelativePoseVerdict::NoMotion => Some(self.fit(&Matrix3::identity(), &Matrix3::zeros())),
             _ => None,
         }
     }
