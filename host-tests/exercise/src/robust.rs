@@ -131,6 +131,7 @@ pub(crate) fn engine<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
     let location = Location(source.array());
     sink.flag(location.reject(&source.scalar()));
     sink.flag(location.settles(&source.scalar(), &mut 0));
+    sink.flag(location.repeats(&[0, 1], &T::ZERO));
     sink.numbers(location.polish(&source.scalar(), T::MAX, &mut ScoreCounts::default()).iter());
     let consensus = ransac(&location, &options, None, 3, Some(&mut keep_going));
     if let Some((model, score)) = consensus.best {
