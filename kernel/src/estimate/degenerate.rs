@@ -163,10 +163,11 @@ fn off_line<T: Real, B: EpipolarBlock<T>>(
     off
 }
 
-/// True where the inliers are repetitions of fewer than `needed` distinct points but for as few as chance explains.
+/// True where the inliers are repetitions of fewer than `needed` distinct points but for as few as chance explains. One
+/// function for all lists.
 pub(super) fn few_distinct<T: Real, B: EpipolarBlock<T>>(
     data: BlockSlice<'_, B>,
-    inliers: impl Iterator<Item = u32>,
+    inliers: &mut dyn Iterator<Item = u32>,
     needed: u32,
     sigma: T,
     accident: T,

@@ -279,7 +279,7 @@ impl<T: Real> Judge<'_, '_, T> {
         let mispaired = measured_accident(data, accident, |block: &PlaneBlock<T>| {
             transfer_sq(&model.0, block, &[scale; LANES])
         });
-        if few_distinct(data, indices.iter().copied(), 4, sigma, mispaired) {
+        if few_distinct(data, &mut indices.iter().copied(), 4, sigma, mispaired) {
             return (HomographyVerdict::Unobservable(Unobservable::TooFewDistinct), noise);
         }
         if on_a_line(data, indices, sigma, accident) {

@@ -86,8 +86,8 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
 
     /// The verdict where no hypothesis was found at all.
     fn without_model(&self, estimate: &mut RelativePoseEstimate<T>) {
-        let all = 0..self.problem.data.count as u32;
-        estimate.verdict = if few_distinct(self.problem.data, all, 5, self.sigma, self.accident()) {
+        let mut all = 0..self.problem.data.count as u32;
+        estimate.verdict = if few_distinct(self.problem.data, &mut all, 5, self.sigma, self.accident()) {
             RelativePoseVerdict::Unobservable(Unobservable::TooFewDistinct)
         } else {
             RelativePoseVerdict::NoConsensus
@@ -126,7 +126,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         // Where the options promise less noise than there is, the data are believed.
         let sigma = max(self.sigma, noise);
         let indices = list(mask, order);
-        if few_distinct(problem.data, indices.iter().copied(), 5, sigma, accident) {
+        if few_distinct(problem.data, &mut indices.iter().copied(), 5, sigma, accident) {
             estimate.verdict = RelativePoseVerdict::Unobservable(Unobservable::TooFewDistinct);
             return;
         }
