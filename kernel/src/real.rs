@@ -190,6 +190,12 @@ pub(crate) fn copysign<T: Real>(x: T, sign: T) -> T {
     x.raw_copysign(if sign <= T::ZERO || sign > T::ZERO { sign } else { T::ONE })
 }
 
+/// As [`copysign`], without asking whether `sign` is NaN: where the result is then NaN too, or not used.
+#[inline(always)]
+pub(crate) fn with_sign_of<T: Real>(x: T, sign: T) -> T {
+    x.raw_copysign(sign)
+}
+
 /// The larger of two numbers; `b` where they do not compare.
 #[inline(always)]
 pub fn max<T: Real>(a: T, b: T) -> T {

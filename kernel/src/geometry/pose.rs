@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix3, Matrix3x2, Quaternion, Translation3, UnitQuat
 
 use crate::Real;
 use crate::linalg::{Svd3, product, svd3};
-use crate::real::{abs, atan2, is_finite, lit, max, sin_cos, sqrt};
+use crate::real::{abs, atan2, is_finite, lit, max, sin_cos, sqrt, with_sign_of};
 
 /// A pose maps into the camera: `x_cam = R X + t`. Of two views, the pose of view 2 in the frame of view 1:
 /// `X2 = R X1 + t`, |t| = 1 where scale is unobservable.
@@ -24,21 +24,22 @@ pub fn quaternion_from_matrix<T: Real>(r: &Matrix3<T>) -> UnitQuaternion<T> {
     let (a, b, c) = (r[(0, 0)], r[(1, 1)], r[(2, 2)]);
     let (wx, wy, wz) = (r[(2, 1)] - r[(1, 2)], r[(0, 2)] - r[(2, 0)], r[(1, 0)] - r[(0, 1)]);
     let (xy, xz, yz) = (r[(0, 1)] + r[(1, 0)], r[(0, 2)] + r[(2, 0)], r[(1, 2)] + r[(2, 1)]);
-    let (plus, minus) = (T::ONE + a, T::ONE - a);
     let (sum, difference) = (b + c, b - c);
-    // The columns of 4 q q' are q times 4 q_k. With the signs that let them add up their sum is q times four times
-    // |w| + |x| + |y| + |z|, at least 4: nothing cancels, and no branch asks which component is large.
-    let column_w = [plus + sum, wx, wy, wz];
-    let column_x = [wx, plus - sum, xy, xz];
-    let column_y = [wy, xy, minus + difference, yz];
-    let column_z = [wz, xz, yz, minus - difference];
-    let add = |a: &[T; 4], b: &[T; 4], sign: T| {
-        let s = if sign < T::ZERO { -T::ONE } else { T::ONE };
-        [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2], a[3] + s * b[3]]
+    // The columns of 4 q q' are q times 4 q_k. Of two of them, added with the sign that lets them add up, the sum is q times
+    // four times |w| + |x| (or |y| + |z|): nothing cancels. The first two serve unless both are small: 4 (w^2 + x^2) is
+    // 2 (1 + a), below 1/2 for one in eight rotations at random.
+    let [w, x, y, z] = if a > lit(-0.75) {
+        let s = with_sign_of(T::ONE, wx);
+        let plus = T::ONE + a;
+        [plus + sum + abs(wx), wx + s * (plus - sum), wy + s * xy, wz + s * xz]
+    } else {
+        let s = with_sign_of(T::ONE, yz);
+        let minus = T::ONE - a;
+        [wy + s * wz, xy + s * xz, minus + difference + abs(yz), yz + s * (minus - difference)]
     };
-    let (u, v) = (add(&column_w, &column_x, wx), add(&column_y, &column_z, yz));
-    let [w, x, y, z] = add(&u, &v, (u[0] * v[0] + u[1] * v[1]) + (u[2] * v[2] + u[3] * v[3]));
-    let scale = T::ONE / sqrt(w * w + x * x + y * y + z * z);
+    let square = (w * w + x * x) + (y * y + z * z);
+    // Over the root, without waiting for it.
+    let scale = with_sign_of(sqrt(square) * (T::ONE / square), w);
     UnitQuaternion::new_unchecked(Quaternion::new(w * scale, x * scale, y * scale, z * scale))
 }
 

@@ -7,7 +7,7 @@
 use nalgebra::Vector3;
 
 use crate::Real;
-use crate::real::{abs, lit, max, sqrt};
+use crate::real::{abs, lit, max, sqrt, with_sign_of};
 
 /// Newton steps allowed for a root; five are usual, a start far from a triple root gains a factor 2/3 a step.
 const MAX_STEPS: usize = 40;
@@ -19,39 +19,44 @@ const MAX_STEPS: usize = 40;
 /// without trigonometry or cube roots. The start is where the parabola that touches the cubic at its extremum has its root,
 /// or above the root of a monotone cubic. The error after a step is of the order of its fourth power; the last step is below
 /// `last_step` of the distance to the inflection.
+///
+/// Time is a chain of operations that wait for each other, so sums and products are paired to be short rather than few.
 #[inline]
 pub(crate) fn real_root_of_cubic<T: Real>(c2: T, c1: T, c0: T, last_step: T) -> T {
-    let three = lit::<T>(3.0);
-    let value = |x: T| ((x + c2) * x + c1) * x + c0;
-    // About the inflection: t^3 - 3 p t + q, the isolated root on the side of -q.
-    let centre = -c2 * lit::<T>(1.0 / 3.0);
-    let p = centre * centre - c1 * lit::<T>(1.0 / 3.0);
-    let q = value(centre);
+    let (third, three) = (lit::<T>(1.0 / 3.0), lit::<T>(3.0));
+    // With x = centre -+ t, the inflection and the distance from it: t^3 - 3 p t - q, q >= 0.
+    let centre = -c2 * third;
+    let square = centre * centre;
+    let p = square - c1 * third;
+    let at_centre = c0 + centre * (c1 - (square + square));
+    let q = abs(at_centre);
     // Beyond the root: for p > 0 the root of the parabola that touches at the extremum, else (mean inequality)
     // t^3 - 3 p t >= 2 sqrt(-3 p) t^2 > 3 sqrt(-p) t^2. One formula for both, without a branch.
     let size = abs(p);
     // The floor keeps the start of a nearly triple root within some steps of it.
-    let extremum = sqrt(max(size, T::EPSILON * (c2 * c2 + abs(q)) + T::MIN_POSITIVE));
+    let floored = max(size, T::EPSILON * (c2 * c2 + abs(c0)) + T::MIN_POSITIVE);
+    let extremum = sqrt(floored);
     let above = if p > T::ZERO { extremum } else { T::ZERO };
-    let t = above + sqrt((abs(q) / extremum + (size + p)) * lit::<T>(1.0 / 3.0));
-    let mut x = if q > T::ZERO { centre - t } else { centre + t };
-    let step = |x: T| {
-        let f = value(x);
-        let half_curvature = three * x + c2;
-        let slope = (half_curvature + c2) * x + c1;
+    let mut t = above + sqrt(q * (third / floored) * extremum + (size + p) * third);
+    let p3 = three * p;
+    let step = |t: T| {
+        let square = t * t;
+        let f = square * t - (p3 * t + q);
+        let slope = three * square - p3;
         let square = slope * slope;
-        let product = f * half_curvature;
-        f * (square - product) / (slope * (square - product - product) + f * f)
+        // f times half the curvature
+        let product = f * (three * t);
+        f * (square - product) / (slope * (square - (product + product)) + f * f)
     };
-    x -= step(x);
+    t -= step(t);
     for _ in 0..MAX_STEPS {
-        let step = step(x);
-        x -= step;
-        if !(abs(step) > last_step * abs(x - centre)) {
+        let step = step(t);
+        t -= step;
+        if !(abs(step) > last_step * t) {
             break;
         }
     }
-    x
+    centre - with_sign_of(t, at_centre)
 }
 
 /// Lines `p`, `q` with `c ~ p q' + q p'`, for a symmetric `c` (its upper triangle) of rank two whose lines are real;

@@ -8,10 +8,10 @@ use nalgebra::Vector3;
 
 use crate::geometry::{Pose, pose};
 use crate::linalg::conic::{lines_of_conic, real_root_of_cubic};
-use crate::real::{abs, lit, max, min, sqrt};
+use crate::real::{abs, lit, max, min, sqrt, with_sign_of};
 use crate::{Real, Solutions};
 
-/// Newton steps on the three distances.
+/// Newton steps on the three distances. After a step what remains of a residual is the square of the step.
 const MAX_REFINEMENTS: usize = 5;
 
 /// The up to four poses of a camera that sees three known points along given bearings.
@@ -35,12 +35,14 @@ const MAX_REFINEMENTS: usize = 5;
 /// within 1e-3 rad, where an exact solver of the rounded input reaches 99.99 %.
 ///
 /// # Cost
-/// Two or three steps on a cubic, two quadratics, and for each solution one or two Newton steps of at most five.
+/// Two or three steps on a cubic, two quadratics, of which one as a rule has real roots, and for its two candidates side by
+/// side one or two Newton steps of at most five.
 ///
 /// # References
 /// Y. Ding, J. Yang, V. Larsson, C. Olsson, K. Astrom, "Revisiting the P3P Problem", CVPR 2023. Here the cubic's best
-/// conditioned root is found without trigonometry, each line is solved for the distance that it fixes best, angles enter
-/// as chords, which keeps their digits in `f32`, and the distances are refined on the original equations.
+/// conditioned root is found without trigonometry, positions on each line are counted from the foot of a perpendicular,
+/// so that no coordinate need be divided by, angles enter as chords, which keeps their digits in `f32`, and the distances
+/// are refined on the original equations.
 ///
 /// # Examples
 /// ```
@@ -55,6 +57,17 @@ const MAX_REFINEMENTS: usize = 5;
 /// ```
 pub fn p3p<T: Real>(bearings: &[Vector3<T>; 3], points: &[Vector3<T>; 3]) -> Solutions<Pose<T>, 4> {
     let mut solutions = Solutions::new();
+    solve(bearings, points, &mut solutions);
+    solutions
+}
+
+/// A function of its own, so that the solutions are written where the caller wants them.
+#[inline]
+fn solve<T: Real>(
+    bearings: &[Vector3<T>; 3],
+    points: &[Vector3<T>; 3],
+    solutions: &mut Solutions<Pose<T>, 4>,
+) {
     let [x0, x1, x2] = bearings;
     let [p0, p1, p2] = points;
     let (f1, f2) = (p1 - p0, p2 - p0);
@@ -104,102 +117,104 @@ pub fn p3p<T: Real>(bearings: &[Vector3<T>; 3], points: &[Vector3<T>; 3]) -> Sol
     let g3 = normal * inverse;
     let (g1, g2) = (f2.cross(&g3), g3.cross(&f1));
     if !(area > total * total * (T::EPSILON * T::EPSILON * lit::<T>(64.0))) {
-        return solutions;
+        return;
     }
 
-    // The points of the two lines on the conic s2 D01 - s1 D02, the farthest from the pair. Nothing here branches: what is
-    // not real becomes NaN and fails the last comparison.
+    // The points of the two lines on the conic s2 D01 - s1 D02, the farthest from the pair: n / m, the coordinates along a
+    // line of direction (ly, -lx, 0) from its point (fx, fy, fz), are the roots of t2 n^2 + 2 t1 n m + t0 m^2.
     let ba = s2 * a - s1 * b;
     let (q00, q11, q22) = (cs2 - cs1, cs2 - ba, -cs1 - ba);
     let (q01, q02, q12) = (-cs2 * m01, cs1 * m02, ba * m12);
-    let mut candidates = [[T::ZERO; 3]; 4];
-    let mut count = 0;
-    for line in lines {
-        // d0 or d1, whichever the line fixes better, is e = -(lf f + lg g) of the other, f, and of d2 = g.
-        let swap = abs(line.y) > abs(line.x);
-        let in_order = |a: T, b: T| if swap { (b, a) } else { (a, b) };
-        let (le, lf) = in_order(line.x, line.y);
-        let (qee, qff) = in_order(q00, q11);
-        let (qeg, qfg) = in_order(q02, q12);
-        let inverse = T::ONE / le;
-        let (lf, lg) = (lf * inverse, line.z * inverse);
-        // t2 f^2 + 2 t1 f g + t0 g^2 = 0
-        let eef = qee * lf - q01;
-        let t2 = qff + lf * (eef - q01);
-        let t1 = qfg + lg * eef - qeg * lf;
-        let t0 = q22 + lg * (qee * lg - qeg - qeg);
+    let [first, second] = lines.map(|line| {
+        let (lx, ly) = (line.x, line.y);
+        let (fx, fy, fz) = (-line.z * lx, -line.z * ly, lx * lx + ly * ly);
+        let (e0, e1, e2) = (q00 * ly - q01 * lx, q01 * ly - q11 * lx, q02 * ly - q12 * lx);
+        let t2 = e0 * ly - e1 * lx;
+        let t1 = (e0 * fx + e1 * fy) + e2 * fz;
+        let half = q01 * fy + q02 * fz;
+        let t0 = fx * (q00 * fx + (half + half)) + (fy * (q11 * fy + T::TWO * q12 * fz) + q22 * fz * fz);
         let (square, product) = (t1 * t1, t2 * t0);
         let discriminant = square - product;
+        let root = sqrt(max(discriminant, T::ZERO));
+        let q = -(t1 + with_sign_of(root, t1));
         // A double root may fall on either side of zero by rounding.
-        let rounding = (square + abs(product)) * T::EPSILON * lit::<T>(64.0);
-        let root = sqrt(max(discriminant, min(discriminant + rounding, T::ZERO)));
-        let q = if t1 > T::ZERO { -t1 - root } else { root - t1 };
-        // f : g
-        for (n1, n2) in [(q, t2), (t0, q)] {
-            let (f, g) = (abs(n1), abs(n2));
-            let e = -(lf * f + lg * g);
-            let (d0, d1) = in_order(e, f);
-            if let Some(candidate) = candidates.get_mut(count) {
-                *candidate = [d0, d1, g];
-            }
-            count += usize::from((e > T::ZERO) & (n1 * n2 > T::ZERO));
-        }
-    }
+        let rounding = (square + abs(product)) * (T::EPSILON * lit::<T>(64.0));
+        let inverse = T::ONE / fz;
+        [t2, q, t0, fx * inverse, fy * inverse, lx * inverse, ly * inverse, discriminant + rounding]
+    });
 
     let side = sqrt(a12);
-    let (h1, h2, h3) = (g1.dot(p0), g2.dot(p0), g3.dot(p0));
-    for d in candidates.iter_mut().take(count) {
-        let [d0, d1, d2] = *d;
-        let e12 = d1 - d2;
-        let square = e12 * e12 + T::TWO * u12 * (d1 * d2);
-        let scale = side * sqrt(square) * (T::ONE / square);
-        *d = [d0 * scale, d1 * scale, d2 * scale];
-        if !refine(d, [u01, u02, u12], [a01, a02, a12], total) {
-            continue;
+    let heights = Vector3::new(g1.dot(p0), g2.dot(p0), g3.dot(p0));
+    let converged = total * T::EPSILON;
+    // As a rule one line of the two has real points: chosen by its place in memory, for what a branch would do here cannot be
+    // foreseen.
+    let [on_first, on_second] = [first, second].map(|[.., real]| real >= T::ZERO);
+    let of_lines = [first, second];
+    for line in usize::from(!on_first)..1 + usize::from(on_second) {
+        let [t2, q, t0, fx, fy, lx, ly, _] = of_lines[line & 1];
+        // Both candidates side by side, whether their distances are positive or not.
+        let (n, m) = ([q, t0], [t2, q]);
+        let mut d = [[T::ZERO; 2]; 3];
+        let mut wanted = [false; 2];
+        for i in 0..2 {
+            let (d0, d1, d2) = (m[i] * fx + n[i] * ly, m[i] * fy - n[i] * lx, m[i]);
+            let e12 = d1 - d2;
+            let square = e12 * e12 + T::TWO * u12 * (d1 * d2);
+            let scale = with_sign_of(sqrt(square) * (side * (T::ONE / square)), d2);
+            (d[0][i], d[1][i], d[2][i]) = (d0 * scale, d1 * scale, d2 * scale);
+            wanted[i] = (d[0][i] > T::ZERO) & (d[1][i] > T::ZERO);
         }
-        let y0 = x0 * d[0];
-        let (e1, e2) = (x1 * d[1] - y0, x2 * d[2] - y0);
-        let e3 = e1.cross(&e2);
-        let rotation = e1 * g1.transpose() + e2 * g2.transpose() + e3 * g3.transpose();
-        let translation = y0 - (e1 * h1 + e2 * h2 + e3 * h3);
-        if let Some(pose) = pose::finite(pose::from_parts(&rotation, &translation)) {
-            solutions.push(pose);
+        let mut found = [false; 2];
+        for _ in 0..MAX_REFINEMENTS {
+            for i in 0..2 {
+                if !cfg!(scalar) || wanted[i] {
+                    let at = [d[0][i], d[1][i], d[2][i]];
+                    let (to, step_sq) = newton(at, [u01, u02, u12], [a01, a02, a12]);
+                    [d[0][i], d[1][i], d[2][i]] = to;
+                    found[i] = step_sq < converged;
+                }
+            }
+            if (found[0] | !wanted[0]) & (found[1] | !wanted[1]) {
+                break;
+            }
+        }
+        for i in 0..2 {
+            let [d0, d1, d2] = [d[0][i], d[1][i], d[2][i]];
+            if !(wanted[i] && found[i] && min(min(d0, d1), d2) > T::ZERO) {
+                continue;
+            }
+            let y0 = x0 * d0;
+            let (e1, e2) = (x1 * d1 - y0, x2 * d2 - y0);
+            let e3 = e1.cross(&e2);
+            let rotation = e1 * g1.transpose() + e2 * g2.transpose() + e3 * g3.transpose();
+            let translation = y0 - (e1 * heights.x + e2 * heights.y + e3 * heights.z);
+            if let Some(pose) = pose::finite(pose::from_parts(&rotation, &translation)) {
+                solutions.push(pose);
+            }
         }
     }
-    solutions
 }
 
-/// Newton on the distances. False where they are no solution.
-#[inline]
-fn refine<T: Real>(d: &mut [T; 3], u: [T; 3], a: [T; 3], total: T) -> bool {
-    let [u01, u02, u12] = u;
-    let [a01, a02, a12] = a;
-    // After a Newton step what remains of a residual is the square of the step.
-    let converged = total * T::EPSILON * lit::<T>(16.0);
-    for _ in 0..MAX_REFINEMENTS {
-        let [d0, d1, d2] = *d;
-        // |d0 x0 - d1 x1|^2 = (d0 - d1)^2 + 2 u01 d0 d1: no cancellation before the difference from a01
-        let (e01, e02, e12) = (d0 - d1, d0 - d2, d1 - d2);
-        let (v01, v10) = (u01 * d0, u01 * d1);
-        let (v02, v20) = (u02 * d0, u02 * d2);
-        let (v12, v21) = (u12 * d1, u12 * d2);
-        let r01 = (e01 * e01 - a01) * T::HALF + v01 * d1;
-        let r02 = (e02 * e02 - a02) * T::HALF + v02 * d2;
-        let r12 = (e12 * e12 - a12) * T::HALF + v12 * d2;
-        // J = [p q 0; r 0 s; 0 u v] by its adjugate
-        let (p, q) = (e01 + v10, v01 - e01);
-        let (r, s) = (e02 + v20, v02 - e02);
-        let (u, v) = (e12 + v21, v12 - e12);
-        let (su, rv) = (s * u, r * v);
-        let inverse = T::ONE / (p * su + q * rv);
-        let w = v * r02 - s * r12;
-        let step0 = (su * r01 + q * w) * inverse;
-        let step1 = (rv * r01 - p * w) * inverse;
-        let step2 = (u * (p * r02 - r * r01) + q * r * r12) * inverse;
-        *d = [d0 - step0, d1 - step1, d2 - step2];
-        if step0 * step0 + step1 * step1 + step2 * step2 < converged {
-            return min(min(d[0], d[1]), d[2]) > T::ZERO;
-        }
-    }
-    false
+/// Where a Newton step leads from the distances; the square of its length.
+#[inline(always)]
+fn newton<T: Real>([d0, d1, d2]: [T; 3], [u01, u02, u12]: [T; 3], [a01, a02, a12]: [T; 3]) -> ([T; 3], T) {
+    // |d0 x0 - d1 x1|^2 = (d0 - d1)^2 + 2 u01 d0 d1: no cancellation before the difference from a01
+    let (e01, e02, e12) = (d0 - d1, d0 - d2, d1 - d2);
+    let (v01, v10) = (u01 * d0, u01 * d1);
+    let (v02, v20) = (u02 * d0, u02 * d2);
+    let (v12, v21) = (u12 * d1, u12 * d2);
+    let r01 = (e01 * e01 - a01) * T::HALF + v01 * d1;
+    let r02 = (e02 * e02 - a02) * T::HALF + v02 * d2;
+    let r12 = (e12 * e12 - a12) * T::HALF + v12 * d2;
+    // J = [p q 0; r 0 s; 0 u v] by its adjugate
+    let (p, q) = (e01 + v10, v01 - e01);
+    let (r, s) = (e02 + v20, v02 - e02);
+    let (u, v) = (e12 + v21, v12 - e12);
+    let (su, rv) = (s * u, r * v);
+    let inverse = T::ONE / (p * su + q * rv);
+    let w = v * r02 - s * r12;
+    let step0 = (su * r01 + q * w) * inverse;
+    let step1 = (rv * r01 - p * w) * inverse;
+    let step2 = (u * (p * r02 - r * r01) + q * r * r12) * inverse;
+    ([d0 - step0, d1 - step1, d2 - step2], step0 * step0 + step1 * step1 + step2 * step2)
 }
