@@ -29,6 +29,7 @@ fn ln_choose<T: Real>(n: u32, k: u32) -> T {
 
 /// True where `agreeing` of `count` correspondences agree with a model fitted to `freedom` of them more often than
 /// wrong ones do by accident with probability `p` each.
+#[cfg_attr(small, inline(never))]
 pub(super) fn beyond_chance<T: Real>(count: u32, agreeing: u32, freedom: u32, p: T) -> bool {
     ln_accidents(count, agreeing, freedom, p) < ln(lit(ACCIDENTS))
 }

@@ -91,6 +91,7 @@ fn fit<T: Real, B: EpipolarBlock<T>>(
 }
 
 /// True where the inliers lie on one line in both views but for as few as chance explains.
+#[cfg_attr(small, inline(never))]
 pub(super) fn on_a_line<T: Real, B: EpipolarBlock<T>>(
     data: BlockSlice<'_, B>,
     inliers: &[u32],

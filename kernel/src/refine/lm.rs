@@ -76,8 +76,13 @@ impl<T: Real, const P: usize> NormalEquations<T, P> {
             let diagonal = damped.data.0[p][p];
             damped.data.0[p][p] = diagonal + damping * diagonal;
         }
-        let step = -Ldlt::new(&damped)?.solve(&self.gradient);
-        Some((step, -step.dot(&self.gradient)))
+        let mut step = Ldlt::new(&damped)?.solve(&self.gradient);
+        let mut promise = T::ZERO;
+        for (x, g) in step.iter_mut().zip(&self.gradient) {
+            promise += *x * *g;
+            *x = -*x;
+        }
+        Some((step, promise))
     }
 
     /// Adds those of other correspondences.

@@ -61,6 +61,7 @@ const LEAST_LINE: usize = 15;
 
 impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     /// The chance of a wrong correspondence to be an inlier.
+    #[cfg_attr(small, inline(never))]
     fn accident(&self) -> T {
         line_accident(self.problem.data, self.problem.threshold)
     }
