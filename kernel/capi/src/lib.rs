@@ -3,6 +3,8 @@
 #![deny(clippy::undocumented_unsafe_blocks)]
 // The files of `api` are written for one scalar and compiled for each.
 #![allow(clippy::duplicate_mod)]
+// The unit tests are those of `raw.rs`: without the API they are compiled in a moment.
+#![cfg_attr(test, allow(dead_code, unused_imports, unused_macros))]
 //! The C ABI of `epipole`. C programs read `include/epipole.h`; its rules stand in `kernel/CONVENTIONS.md`.
 //!
 //! | file | holds |
@@ -40,7 +42,7 @@ pub use workspace::{
 };
 
 /// The functions that end in `_f32`.
-#[cfg(feature = "f32")]
+#[cfg(all(feature = "f32", not(test)))]
 #[path = "api"]
 pub mod f32 {
     macro_rules! name {
@@ -61,7 +63,7 @@ pub mod f32 {
 }
 
 /// The functions that end in `_f64`.
-#[cfg(feature = "f64")]
+#[cfg(all(feature = "f64", not(test)))]
 #[path = "api"]
 pub mod f64 {
     macro_rules! name {
