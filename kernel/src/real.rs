@@ -184,13 +184,8 @@ pub fn abs<T: Real>(x: T) -> T {
     x.raw_abs()
 }
 
-/// The magnitude of `x` with the sign of `sign`. NaN counts as positive: its sign bit is the target's choice.
-#[inline(always)]
-pub(crate) fn copysign<T: Real>(x: T, sign: T) -> T {
-    x.raw_copysign(if sign <= T::ZERO || sign > T::ZERO { sign } else { T::ONE })
-}
-
-/// As [`copysign`], without asking whether `sign` is NaN: where the result is then NaN too, or not used.
+/// The magnitude of `x` with the sign of `sign`. NaN's sign bit is the target's choice: only for a `sign` that is none, or
+/// where the result is then NaN too, or not used.
 #[inline(always)]
 pub(crate) fn with_sign_of<T: Real>(x: T, sign: T) -> T {
     x.raw_copysign(sign)

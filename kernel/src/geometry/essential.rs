@@ -7,7 +7,7 @@ use super::pose::{from_parts, rotation_matrix, skew};
 use super::{Fundamental, Pose};
 use crate::Real;
 use crate::linalg::least_singular3;
-use crate::real::{abs, copysign, is_finite, lit, max, sqrt};
+use crate::real::{abs, is_finite, lit, max, sqrt, with_sign_of};
 
 /// An essential matrix, known up to scale and sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -137,15 +137,18 @@ impl<T: Real> Essential<T> {
         let [a, b, c] = m.data.0.map(Vector3::from);
         // The cofactors of E are s1 s2 u3 v3': with the signs that let them add up, no column need be the largest.
         let cofactors = [b.cross(&c), c.cross(&a), a.cross(&b)];
-        let add = |u: &Vector3<T>, v: &Vector3<T>| u + v * copysign(T::ONE, u.dot(v));
+        let add = |u: &Vector3<T>, v: &Vector3<T>| u + v * with_sign_of(T::ONE, u.dot(v));
         let u = add(&add(&cofactors[0], &cofactors[1]), &cofactors[2]);
         let v = Vector3::new(cofactors[0].dot(&u), cofactors[1].dot(&u), cofactors[2].dot(&u));
         let (u_sq, v_sq) = (u.norm_squared(), v.norm_squared());
-        let (u_inverse, v_norm) = (T::ONE / sqrt(u_sq), sqrt(v_sq));
-        let (u3, v3) = (u * u_inverse, v * (T::ONE / v_norm));
+        // Divisions that do not wait for a root: 1 / sqrt x = sqrt x / x.
+        let v_norm = sqrt(v_sq);
+        let (u_inverse, v_inverse) = (sqrt(u_sq) * (T::ONE / u_sq), v_norm * (T::ONE / v_sq));
+        let (u3, v3) = (u * u_inverse, v * v_inverse);
         // (s1 + s2)^2 = s1^2 + s2^2 + 2 s1 s2, and the cofactors map u3 to s1 s2 v3.
         let size = m.norm_squared();
-        let scale = T::ONE / sqrt(size + T::TWO * (v_norm * u_inverse));
+        let sum_sq = size + T::TWO * (v_norm * u_inverse);
+        let scale = sqrt(sum_sq) * (T::ONE / sum_sq);
         // -[u3]x E - E [v3]x = (s1 + s2) (u1 v2' - u2 v1'), whatever s1 and s2.
         let turn = Matrix3::from_columns(&[
             a.cross(&u3) - b * v3.z + c * v3.y,
@@ -157,7 +160,7 @@ impl<T: Real> Essential<T> {
         let rotations = [axis + turn, axis - turn];
         // What rounding leaves of a second singular value that is zero; false for NaN, too.
         let tolerance = lit::<T>(16.0) * T::EPSILON;
-        let full = u_sq > tolerance * tolerance * size * size && v_sq > T::ZERO;
+        let full = u_sq > tolerance * tolerance * size * size && v_sq > T::MIN_POSITIVE;
         full.then_some(TwistedPair { rotations, t: u3 })
     }
 

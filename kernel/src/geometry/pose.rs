@@ -351,7 +351,8 @@ pub(crate) fn rotation_about_y<T: Real>(c: T, s: T) -> UnitQuaternion<T> {
     } else {
         (-s, c - T::ONE)
     };
-    let scale = T::ONE / sqrt(w * w + y * y);
+    let square = w * w + y * y;
+    let scale = sqrt(square) * (T::ONE / square);
     let (w, y) = (w * scale, y * scale);
     UnitQuaternion::new_unchecked(Quaternion::new(w, T::ZERO, y, T::ZERO))
 }

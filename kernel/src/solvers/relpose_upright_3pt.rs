@@ -11,7 +11,7 @@ use nalgebra::{Translation3, Vector3};
 use crate::geometry::Pose;
 use crate::geometry::pose::rotation_about_y;
 use crate::linalg::conic::{lines_of_conic, real_root_of_cubic};
-use crate::real::{abs, lit, max, sqrt};
+use crate::real::{abs, lit, max, sqrt, with_sign_of};
 use crate::{Real, Solutions};
 
 /// The up to four relative poses of three correspondences, if both frames have the vertical as their y axis.
@@ -56,7 +56,13 @@ use crate::{Real, Solutions};
 /// ```
 pub fn relpose_upright_3pt<T: Real>(x1: &[Vector3<T>; 3], x2: &[Vector3<T>; 3]) -> Solutions<Pose<T>, 4> {
     let mut solutions = Solutions::new();
+    solve(x1, x2, &mut solutions);
+    solutions
+}
 
+/// A function of its own, so that the solutions are written where the caller wants them.
+#[inline]
+fn solve<T: Real>(x1: &[Vector3<T>; 3], x2: &[Vector3<T>; 3], solutions: &mut Solutions<Pose<T>, 4>) {
     // 2 det = Re(S2 / e^2) + 2 Im(S1 / e) - S0
     let horizontal = |v: &Vector3<T>| Complex(v.z, v.x);
     let term = |i: usize, j: usize, k: usize| {
@@ -129,11 +135,10 @@ pub fn relpose_upright_3pt<T: Real>(x1: &[Vector3<T>; 3], x2: &[Vector3<T>; 3]) 
         // In radians; zero for a root that is well conditioned.
         let step = if reach > T::ZERO { newton(e, (s2, s1), inverse_size, reach, x1, x2) } else { T::ZERO };
         let e = (e.0 - step * e.1, e.1 + step * e.0);
-        if !push_pose(e, x1, x2, &mut solutions) {
-            push_pose_of_other_points(e, x1, x2, &mut solutions);
+        if !push_pose(e, x1, x2, solutions) {
+            push_pose_of_other_points(e, x1, x2, solutions);
         }
     }
-    solutions
 }
 
 /// `x` turned about y.
@@ -218,8 +223,8 @@ fn push_pose<T: Real>(
         let across = t.cross(&y2.cross(z2));
         let in_front = (a0 * across.dot(z2) > T::ZERO) & (a0 * across.dot(&y2) > T::ZERO);
         if in_front && is_wide(square, &n0, &n1) {
-            let scale = T::ONE / sqrt(square);
-            let t = t * if a0 > T::ZERO { scale } else { -scale };
+            // Over the root, without waiting for it.
+            let t = t * with_sign_of(sqrt(square) * (T::ONE / square), a0);
             solutions.push(Pose::from_parts(Translation3::from(t), rotation_about_y(e.0, e.1)));
             return true;
         }
