@@ -10,7 +10,7 @@ use super::super::chance::line_accident;
 use super::super::prior::PriorFit;
 use super::LEAST_INLIERS;
 use super::hypothesis::{PoseProblem, repeated};
-use super::judge::Judge;
+use super::judge::{Judge, Left};
 use super::prior::KnownRotation;
 use super::verdict::{RelativePoseEstimate, RelativePoseVerdict};
 use crate::Real;
@@ -261,7 +261,7 @@ pub(super) fn judge<T: Real, B: EpipolarBlock<T>>(
     let mut interrupted = first.is_some_and(|first| first.report.stop == StopReason::Interrupted);
     let confident = first.filter(|first| first.report.stop == StopReason::Confident);
     if let Some(first) = confident {
-        aided.judge(&first, mask, order, estimate);
+        aided.judge(&first, &mut Left::none(), mask, order, estimate);
         if !matches!(estimate.verdict, RelativePoseVerdict::General(_)) {
             estimate.prior = known.agreement(&estimate.verdict);
         }
@@ -286,7 +286,8 @@ pub(super) fn judge<T: Real, B: EpipolarBlock<T>>(
     if interrupted {
         left.budget.max_iterations = 0;
     }
-    let second = ransac(plain.problem, &left, ranked(scores, order, mask.len()), LEAST_INLIERS, keep_going);
+    let ask = keep_going.as_mut().map(|ask| &mut **ask as &mut dyn FnMut(&_) -> bool);
+    let second = ransac(plain.problem, &left, ranked(scores, order, mask.len()), LEAST_INLIERS, ask);
     let total = |mut report: RansacReport<T>| {
         report.spent = second.report.spent.plus(&spent);
         report.spent.inliers = report.inliers;
@@ -297,7 +298,7 @@ pub(super) fn judge<T: Real, B: EpipolarBlock<T>>(
     if let Some(first) = first
         && first.report.cost < second.report.cost
     {
-        aided.judge(&first, mask, order, estimate);
+        aided.judge(&first, &mut Left::none(), mask, order, estimate);
         if !matches!(estimate.verdict, RelativePoseVerdict::General(_)) {
             estimate.prior = known.agreement(&estimate.verdict);
         }
@@ -307,10 +308,11 @@ pub(super) fn judge<T: Real, B: EpipolarBlock<T>>(
         }
     }
     estimate.report = total(second.report);
-    plain.judge(&second, mask, order, estimate);
+    let budget = left.budget.less(&second.report.spent);
+    plain.judge(&second, &mut Left { budget, keep_going }, mask, order, estimate);
     let fit = known.agreement(&estimate.verdict);
     if let Some(PriorFit::Fits(_)) = fit {
-        aided.judge(&second, mask, order, estimate);
+        aided.judge(&second, &mut Left::none(), mask, order, estimate);
     }
     estimate.prior = fit;
 }

@@ -106,20 +106,17 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
     }
 
     /// The share of wrong correspondences that a pose explains by accident, measured on the correspondences
-    /// themselves with view 2 of another in place of their own; never below `least`.
-    pub(super) fn accident(&self, model: &PoseModel<T>, least: T) -> T {
+    /// themselves with view 2 of another in place of their own, of so many `others`; never below `least`.
+    pub(super) fn accident(&self, model: &PoseModel<T>, least: T, others: usize) -> T {
         let view = self.view(model);
         let blocks = self.data.blocks;
         let full = blocks.get(..self.data.count / LANES).unwrap_or(blocks);
         let (mut hits, mut seen) = (0u32, 0u32);
-        let half = full.len() / 2;
         let every = core::cmp::max(full.len() / SAMPLED_BLOCKS, 1);
-        for shift in [self.stride, half, self.stride / 2] {
-            // Blocks of the list and of the list turned by `shift`, but not a block with itself.
-            let shift = if shift < full.len() { shift } else { 0 };
-            if shift == 0 {
-                continue;
-            }
+        let others = core::cmp::min(others, full.len().saturating_sub(1));
+        for k in 1..=others {
+            // Blocks of the list and of the list turned by `shift`, which is never a whole turn.
+            let shift = k * full.len() / (others + 1);
             let (start, end) = full.split_at_checked(shift).unwrap_or((full, &[]));
             for (block, other) in full.iter().zip(end.iter().chain(start)).step_by(every) {
                 let squared = self.squared(&block.mispaired(other), &view);

@@ -2,9 +2,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::super::chance::{ACCIDENTS, EXPLAINED_SIGMAS, beyond_chance, line_accident};
+use super::super::chance::{EXPLAINED_SIGMAS, beyond_chance, line_accident};
 use super::super::degenerate::{few_distinct, list, on_a_line};
 use super::super::prior::PriorFit;
+use super::LEAST_INLIERS;
 use super::covariance::{PsiSums, covariance, variance};
 use super::evidence::{Evidence, Explained};
 use super::hypothesis::{PoseProblem, SAMPLED_BLOCKS, TURNED_BLOCKS};
@@ -19,7 +20,10 @@ use crate::refine::homography::{RotationModel, transfer_sq};
 use crate::refine::lm::{Manifold, normal_equations};
 use crate::refine::relative_pose::PoseModel;
 use crate::robust::loss::Loss;
-use crate::robust::{Consensus, Estimator, Gate, ScoreCounts};
+use crate::robust::{
+    Budget, Consensus, Estimator, Gate, Progress, RansacOptions, RansacReport, ScoreCounts, StopReason,
+    ransac,
+};
 
 use super::super::transfer::TransferProblem;
 
@@ -31,6 +35,19 @@ pub(super) struct Judge<'a, 'b, T: Real, B> {
     /// Displacement in the blocks' unit up to which a correspondence may stand still.
     pub(super) least_motion: T,
     pub(super) seed: u64,
+}
+
+/// What a search has left to spend.
+pub(super) struct Left<'a> {
+    pub(super) budget: Budget,
+    pub(super) keep_going: Option<&'a mut dyn FnMut(&Progress) -> bool>,
+}
+
+impl Left<'_> {
+    /// Nothing.
+    pub(super) fn none() -> Self {
+        Self { budget: Budget { max_iterations: 0, ..Budget::default() }, keep_going: None }
+    }
 }
 
 /// Error of an inlier in two dimensions over the threshold: as likely for a true correspondence as the threshold is in
@@ -54,6 +71,15 @@ const SAME_POSE_SQ: f64 = 0.0005;
 /// Accidents expected at the most where parallax counts as proven against a rotation: where it is hardly visible a general
 /// pose has no direction, so that little is lost.
 const ROTATION_ACCIDENTS: f64 = 1e-4;
+/// Accidents expected at the most where something off a plane counts as proven: to leave a plane that is one costs less than
+/// to hold one that is none.
+const PLANE_ACCIDENTS: f64 = 0.03;
+/// Where a plane explains most inliers, poses that differ hardly differ in cost: so many more samples look for a better one.
+const MORE_SAMPLES: u32 = 300;
+/// With how many others each correspondence is mispaired to measure what chance explains: at first, and where the verdict
+/// hangs on it.
+const MISPAIRED: usize = 3;
+const MISPAIRED_MORE: usize = 24;
 /// Of a scene that stands still at the most one inlier in as many moves by twice the least motion.
 const MOVED_ONE_IN: u32 = 10;
 /// Inliers of which a line is believed where they agree with a pose no better than chance.
@@ -67,17 +93,19 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     }
 
     /// Writes verdict and noise, in the blocks' unit, of what a search found (in place, for a verdict is large), how a prior
-    /// that took part agrees with a general motion, and the inlier mask; uses `order` as memory.
+    /// that took part agrees with a general motion, and the inlier mask; uses `order` as memory. The report is that of the search; what more is spent is
+    /// added.
     pub(super) fn judge(
         &self,
         consensus: &Consensus<PoseModel<T>, T>,
+        left: &mut Left<'_>,
         mask: &mut [bool],
         order: &mut [u32],
         estimate: &mut RelativePoseEstimate<T>,
     ) {
         estimate.noise_px = T::ZERO;
         match &consensus.best {
-            Some((model, _)) => self.verdict(model, mask, order, estimate),
+            Some((model, _)) => self.verdict(model, left, mask, order, estimate),
             None => {
                 mask.iter_mut().for_each(|inlier| *inlier = false);
                 self.without_model(estimate);
@@ -99,6 +127,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     fn verdict(
         &self,
         best: &PoseModel<T>,
+        left: &mut Left<'_>,
         mask: &mut [bool],
         order: &mut [u32],
         estimate: &mut RelativePoseEstimate<T>,
@@ -106,8 +135,11 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         let problem = self.problem;
         let count = problem.data.count as u32;
         let mut refined = self.refine(best, REFINE_PASSES);
-        let accident = problem.accident(&refined, self.accident());
+        let mut accident = problem.accident(&refined, self.accident(), MISPAIRED);
         let (inliers, mut noise) = self.mark(&refined, mask);
+        if !beyond_chance(count, inliers, 5, accident) {
+            accident = problem.accident(&refined, self.accident(), MISPAIRED_MORE);
+        }
         if !beyond_chance(count, inliers, 5, accident) {
             // Of points on one line even wrong pairs may agree.
             let indices = list(mask, order);
@@ -167,6 +199,12 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                     turn + (twin.translation - refined.translation).norm_squared() < lit(SAME_POSE_SQ)
                 };
                 let mut better = None;
+                if planar && let Some(other) = self.another(left, &mut estimate.report) {
+                    let cost = self.cost(&other);
+                    if cost < least {
+                        (better, least) = (Some(other), cost);
+                    }
+                }
                 for twin in &twins {
                     let twin = pose_model(&twin.pose, problem);
                     if clear && leads_back(&twin) {
@@ -189,12 +227,16 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                 if planar && let Some(twin) = twins.first() {
                     // The plane's own lines: those of the pose are the ones that the noise happens to lie along.
                     let epipolar = pose_model(&twin.pose, problem).matrix();
+                    let accident = problem.accident(&refined, self.accident(), MISPAIRED_MORE);
                     let evidence = Evidence { problem, inliers: mask, epipolar, sigma, accident };
                     let explained = evidence.explained(&plane.0);
                     let share =
                         explained.inliers * 20 >= (explained.inliers + explained.others) * PLANE_SHARE_OF_20;
                     let bends = evidence.bends(&plane.0, &refined.matrix(), max(noise, sigma * T::HALF));
-                    if share && !bends && !evidence.proves_parallax(count, &explained, 8, lit(ACCIDENTS)) {
+                    if share
+                        && !bends
+                        && !evidence.proves_parallax(count, &explained, 8, lit(PLANE_ACCIDENTS))
+                    {
                         return self.planar(&plane, &twins, sigma, mask, estimate);
                     }
                 }
@@ -204,6 +246,26 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         estimate.verdict = RelativePoseVerdict::General(motion);
         estimate.noise_px = noise;
         estimate.prior = fit;
+    }
+
+    /// The refined best of some more samples, where the search ended by itself and the budget is not spent; adds what they
+    /// spend. Not inlined: its variables take no stack elsewhere.
+    #[inline(never)]
+    fn another(&self, left: &mut Left<'_>, report: &mut RansacReport<T>) -> Option<PoseModel<T>> {
+        if report.stop != StopReason::Confident {
+            return None;
+        }
+        let samples = core::cmp::min(MORE_SAMPLES, left.budget.max_iterations);
+        let budget = Budget { max_iterations: samples, ..left.budget };
+        let options =
+            RansacOptions { seed: !self.seed, min_iterations: samples, budget, ..RansacOptions::default() };
+        let keep_going = left.keep_going.as_mut().map(|ask| &mut **ask as &mut dyn FnMut(&_) -> bool);
+        let found = ransac::<T, _, 5>(self.problem, &options, None, LEAST_INLIERS, keep_going);
+        report.spent = report.spent.plus(&found.report.spent);
+        if found.report.stop == StopReason::Interrupted {
+            report.stop = StopReason::Interrupted;
+        }
+        found.best.map(|(model, _)| self.refine(&model, REFINE_PASSES))
     }
 
     /// The pose that all inliers support, with what lies just beyond the threshold at a falling weight.

@@ -26,7 +26,7 @@ mod verdict;
 
 use aided::ranked;
 use hypothesis::PoseProblem;
-use judge::Judge;
+use judge::{Judge, Left};
 use prior::KnownRotation;
 pub use prior::RelativePosePrior;
 pub use verdict::{
@@ -59,7 +59,7 @@ impl<T: Real> Default for RelativePoseOptions<T> {
             sigma_px: None,
             least_motion_px: None,
             prior: None,
-            ransac: RansacOptions::default(),
+            ransac: RansacOptions::of_large_samples(),
         }
     }
 }
@@ -427,9 +427,12 @@ fn estimate<T: Real, B: EpipolarBlock<T>>(
         }
         None => judged::<T, B>(units, sigma_px, options, workspace, found, |judge, mask, order, found| {
             let ranked = ranked(guide.scores, order, mask.len());
-            let consensus = ransac(judge.problem, &options.ransac, ranked, LEAST_INLIERS, guide.keep_going);
+            let mut keep_going = guide.keep_going;
+            let ask = keep_going.as_mut().map(|ask| &mut **ask as &mut dyn FnMut(&_) -> bool);
+            let consensus = ransac::<T, _, 5>(judge.problem, &options.ransac, ranked, LEAST_INLIERS, ask);
             found.report = consensus.report;
-            judge.judge(&consensus, mask, order, found);
+            let budget = options.ransac.budget.less(&consensus.report.spent);
+            judge.judge(&consensus, &mut Left { budget, keep_going }, mask, order, found);
         }),
     }
 }
