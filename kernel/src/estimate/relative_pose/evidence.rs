@@ -5,7 +5,7 @@
 //! By count: correspondences that it leaves unexplained agree with the pose more often than chance. Of `m` unexplained
 //! ones `k` agree; a wrong one agrees with the probability `p`, the share of the image within the threshold of an
 //! epipolar line; the pose has two degrees of freedom left once the simpler model is given, so that the expected number
-//! of accidents as good as this is at most `C(m, 2) P(B(m - 2, p) >= k - 2)`: it must be below 0.01, against a rotation
+//! of accidents as good as this is at most `C(m, 2) P(B(m - 2, p) >= k - 2)`: it must be below 0.03, against a rotation
 //! below 0.0001 (where parallax is hardly visible, a general pose has no direction).
 //!
 //! By scatter: on the correspondences that it does explain, the squared error across the epipolar lines is what noise

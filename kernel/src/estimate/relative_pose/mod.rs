@@ -86,7 +86,7 @@ pub type RelativePoseError = TwoViewError;
 /// of the points of the plane z = 1) by the pixels; refined on their inliers with five degrees of freedom. Then the
 /// simplest of no motion, a rotation, a plane and a general motion that the data leave standing is the verdict: a
 /// simpler model falls where correspondences that it does not explain agree with the pose more often than chance (at most
-/// 0.01 accidents expected, 0.0001 against a rotation; the chance is measured on mispaired correspondences), or where the
+/// 0.03 accidents expected, 0.0001 against a rotation; the chance is measured on mispaired correspondences), or where the
 /// errors along the epipolar lines (of a plane: its own) are larger than those across; a plane also where the pose's lines
 /// fit far better than its own. A model explains what lies within 5 sigma, where sigma is the larger of the option's and of
 /// the one that the residuals show.
@@ -120,7 +120,8 @@ pub type RelativePoseError = TwoViewError;
 /// the few poses led astray.
 ///
 /// # Cost
-/// At most `max_iterations` samples, by itself as many as the confidence needs for the inliers found; beyond a budget of
+/// At most `max_iterations` samples, by itself as many as the confidence needs for the inliers found, and 300 more where a
+/// plane holds most of those, for there poses that differ hardly differ in cost; beyond a budget of
 /// residuals at most one refinement (five passes over 256 correspondences at the most, one score of all, and seven passes
 /// over 64 to try a rotation; with a prior six passes over all), and the verdict's passes. A budget of fewer than n
 /// residuals, of 4 n with a prior, scores nothing. At half outliers a prior takes less than a third of the samples; a
