@@ -12,7 +12,7 @@ use crate::real::{abs, from_u32, lit, max, min};
 /// best minimal model need not lie in the best basin.
 const SLACK: f64 = 0.7;
 /// Where the best minimal model explains no more than chance, one in as many near misses is optimised.
-const DOUBTFUL: u32 = 4;
+const DOUBTFUL: u32 = 8;
 /// Until the best optimum has been met [`Estimator::DISCOVERIES`] times (half as many where most agree with it and nothing
 /// rivals it), the run lasts so many times as long.
 const PATIENCE: u32 = 5;

@@ -29,7 +29,7 @@ use crate::solvers::{relpose_upright_3pt, translation_2pt};
 /// Blocks of the correspondences on which hypotheses are polished.
 const SUBSET: usize = 8;
 /// Passes over the data in a local optimisation.
-const LOCAL_PASSES: u32 = 6;
+const LOCAL_PASSES: u32 = 4;
 /// The wide threshold is the narrow one and so many standard deviations of the prior.
 const WIDE_SIGMAS: f64 = 1.0;
 /// Where wrong correspondences lie within the wide threshold more often than this, the prior is too vague to sample by.
@@ -196,7 +196,7 @@ impl<T: Real, B: EpipolarBlock<T>, K: Minimal<T, S>, const S: usize> Estimator<T
     fn refine(&self, model: &PoseModel<T>, residuals: &mut u64) -> Option<PoseModel<T>> {
         // A polished model needs no wide stage.
         let loss = Loss::Tukey(self.problem.threshold * T::TWO);
-        let minimum = self.problem.optimise(model, &loss, LOCAL_PASSES, lit(1e-3));
+        let minimum = self.problem.optimise(model, &loss, LOCAL_PASSES, lit(1e-2));
         *residuals += minimum.passes as u64 * self.problem.data.count as u64;
         Some(minimum.model)
     }

@@ -47,7 +47,7 @@ const CONVERGED: f64 = 0.01;
 /// Blocks that a local optimisation looks at.
 pub(super) const SAMPLED_BLOCKS: usize = 64;
 /// Blocks on which it is tried whether a pose is but a rotation.
-pub(super) const TURNED_BLOCKS: usize = 8;
+const TURNED_BLOCKS: usize = 8;
 /// Passes over those at the most.
 const TURN_PASSES: u64 = TURN_SIGMAS.len() as u64 + 1;
 /// Errors, in standard deviations, up to which correspondences take part in the next rotation: from coarse to fine, so that
@@ -131,21 +131,16 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
     }
 
     /// The rotation that explains the inliers of a pose best, by alternating between the closest rotation of all that are
-    /// explained and the choice of those, on so many of the `blocks`; none where they leave one open, or where less than one in
-    /// `share` of them turns.
-    pub(super) fn rotation(
-        &self,
-        pose: &PoseModel<T>,
-        sigma: T,
-        blocks: usize,
-        share: u32,
-    ) -> Option<RotationModel<T>> {
+    /// explained and the choice of those, on so many of the `blocks`; none where they leave one open, or where less than half
+    /// of them turn.
+    pub(super) fn rotation(&self, pose: &PoseModel<T>, sigma: T, blocks: usize) -> Option<RotationModel<T>> {
         let mut model = RotationModel { rotation: pose.rotation, scales: pose.scales };
         let (s1, s2) = (pose.scales.inverse1(), pose.scales.inverse2());
         let mut limit: T = T::MAX;
+        let sample = self.agreeing(pose, blocks);
         for factor in TURN_SIGMAS {
             let mut moment = Matrix3::zeros();
-            let (inliers, turned) = self.turned(pose, &model, limit, blocks, |block, turned| {
+            let turned = self.turned(&sample, &model, limit, |block, turned| {
                 let (f1, f2) = block.directions();
                 for l in 0..LANES {
                     if turned[l] {
@@ -155,7 +150,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
                     }
                 }
             });
-            if share * turned < inliers {
+            if 2 * turned < sample.count {
                 return None;
             }
             model.rotation = nearest_rotation(&moment)?;
@@ -165,48 +160,58 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         Some(model)
     }
 
-    /// How many inliers of a pose there are, and how many of them a rotation explains up to a squared transfer error, on so
-    /// many of the `blocks`; calls `each` with those of a block.
+    /// Some of the blocks, and which of their correspondences agree with a pose.
+    fn agreeing(&self, pose: &PoseModel<T>, blocks: usize) -> Agreeing {
+        let blocks = blocks.clamp(1, SAMPLED_BLOCKS);
+        let every = core::cmp::max(self.data.blocks.len().div_ceil(blocks), 1);
+        let view = self.view(pose);
+        let mut sample = Agreeing { every, lanes: [[false; LANES]; SAMPLED_BLOCKS], count: 0 };
+        let mut left = self.data.count;
+        for (block, lanes) in self.data.blocks.iter().step_by(every).zip(&mut sample.lanes) {
+            let squared = self.squared(block, &view);
+            for l in 0..LANES {
+                lanes[l] = l < left && squared[l] < T::ONE;
+                sample.count += lanes[l] as u32;
+            }
+            left = left.saturating_sub(LANES * every);
+        }
+        sample
+    }
+
+    /// How many of a sample a rotation explains up to a squared transfer error; calls `each` with those of a block.
     #[inline]
     fn turned(
         &self,
-        pose: &PoseModel<T>,
+        sample: &Agreeing,
         rotation: &RotationModel<T>,
         limit: T,
-        blocks: usize,
         mut each: impl FnMut(&B, &[bool; LANES]),
-    ) -> (u32, u32) {
-        let every = core::cmp::max(self.data.blocks.len().div_ceil(core::cmp::max(blocks, 1)), 1);
-        let (view, h) = (self.view(pose), rotation.matrix());
-        let (mut inliers, mut turned) = (0u32, 0u32);
-        let mut left = self.data.count;
-        for block in self.data.blocks.iter().step_by(every) {
-            let residual = self.squared(block, &view);
+    ) -> u32 {
+        let h = rotation.matrix();
+        let mut turned = 0u32;
+        for (block, lanes) in self.data.blocks.iter().step_by(sample.every).zip(&sample.lanes) {
             let (plane, weight) = block.planes();
             let squared = transfer_sq(&h, &plane, &weight);
             let mut explained = [false; LANES];
             for l in 0..LANES {
-                let inlier = l < left && residual[l] < T::ONE;
-                explained[l] = inlier && squared[l] < limit;
-                inliers += inlier as u32;
+                explained[l] = lanes[l] && squared[l] < limit;
                 turned += explained[l] as u32;
             }
             each(block, &explained);
-            left = left.saturating_sub(LANES * every);
         }
-        (inliers, turned)
+        turned
     }
 
     /// True where a rotation explains what a pose does: then the optima of poses are many, and none is better than the
     /// others.
     fn turns(&self, pose: &PoseModel<T>) -> bool {
         // A threshold is two standard deviations.
-        let Some(rotation) = self.rotation(pose, self.threshold * T::HALF, TURNED_BLOCKS, 2) else {
+        let Some(rotation) = self.rotation(pose, self.threshold * T::HALF, TURNED_BLOCKS) else {
             return false;
         };
         let limit = self.threshold * self.threshold * lit(EXPLAINED_SIGMAS * EXPLAINED_SIGMAS * 0.25);
-        let (inliers, turned) = self.turned(pose, &rotation, limit, TURNED_BLOCKS, |_, _| ());
-        turned * 10 >= inliers * 9
+        let sample = self.agreeing(pose, TURNED_BLOCKS);
+        self.turned(&sample, &rotation, limit, |_, _| ()) * 10 >= sample.count * 9
     }
 
     /// Whether a correspondence is an inlier of a model.
@@ -281,6 +286,13 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
             known.add(sums, &model.rotation, *variance);
         }
     }
+}
+
+/// Correspondences of every so many-th block that agree with a pose.
+struct Agreeing {
+    every: usize,
+    lanes: [[bool; LANES]; SAMPLED_BLOCKS],
+    count: u32,
 }
 
 /// What is computed once a model.

@@ -8,7 +8,7 @@ use super::super::prior::PriorFit;
 use super::LEAST_INLIERS;
 use super::covariance::{PsiSums, covariance, variance};
 use super::evidence::{Evidence, Explained};
-use super::hypothesis::{PoseProblem, SAMPLED_BLOCKS, TURNED_BLOCKS};
+use super::hypothesis::{PoseProblem, SAMPLED_BLOCKS};
 use super::verdict::{GeneralMotion, PureRotation, RelativePoseEstimate, RelativePoseVerdict, Unobservable};
 use crate::Real;
 use crate::geometry::Pose;
@@ -172,18 +172,15 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
             let still = RotationModel { rotation: Matrix3::identity(), scales: problem.scales };
             return self.turned(&still, true, self.least_motion / lit(EXPLAINED_SIGMAS), mask, estimate);
         }
-        // Where most correspondences agree, a few of them tell that it is no rotation, and the pose and its plane are known well
-        // after few passes.
-        let clear = 2 * inliers > count;
-        if (!clear || problem.rotation(&refined, sigma, 2 * TURNED_BLOCKS, 4).is_some())
-            && let Some(rotation) = problem.rotation(&refined, sigma, SAMPLED_BLOCKS, 2)
-        {
+        if let Some(rotation) = problem.rotation(&refined, sigma, SAMPLED_BLOCKS) {
             let explained = evidence.explained(&rotation.matrix());
             if !evidence.proves_parallax(count, &explained, 3, lit(ROTATION_ACCIDENTS)) {
                 let still = self.stands_still(&evidence, &rotation, &explained);
                 return self.turned(&rotation, still, sigma, mask, estimate);
             }
         }
+        // Where most correspondences agree, the pose and its plane are known well after few passes.
+        let clear = 2 * inliers > count;
         if let Some(mut plane) = self.plane(&refined, indices, sigma, clear) {
             let held = evidence.explained(&plane.0).inliers;
             let planar = 20 * held > inliers * LEAST_SHARE_OF_20;
@@ -207,7 +204,9 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                 }
                 for twin in &twins {
                     let twin = pose_model(&twin.pose, problem);
-                    if clear && leads_back(&twin) {
+                    // Nor is one worth it that half of the inliers speak against.
+                    let far = self.cost(&twin) > least + from_u32::<T>(inliers) * T::HALF;
+                    if clear && (far || leads_back(&twin)) {
                         continue;
                     }
                     // Few passes tell whether it comes near the pose.
