@@ -187,6 +187,23 @@ in_both_scalars! {
         });
     }
 
+    /// Also where all that is left of the difference from the pole is rounding.
+    fn tangent_basis_is_orthonormal_a_rounding_from_the_pole<T>() {
+        let pole = Vector3::new(-2.0, -1.0, -2.0) / 3.0;
+        let unit = T::EPSILON.to_f64() / 4.0;
+        let steps = || (-8..=8).map(|k| unit * f64::from(k));
+        for n in steps().flat_map(|x| steps().flat_map(move |y| steps().map(move |z| Vector3::new(x, y, z)))) {
+            let n = (pole + n).map(lit::<T>);
+            if (vector_f64(&n).norm() - 1.0).abs() > T::EPSILON.to_f64() {
+                continue;
+            }
+            let basis: Matrix3x2<f64> = tangent_basis(&n).map(T::to_f64);
+            let frame = Matrix3::from_columns(&[basis.column(0).into(), basis.column(1).into(), vector_f64(&n)]);
+            let error = (frame.transpose() * frame - Matrix3::identity()).amax();
+            assert!(error < tolerances::ROUNDING.of::<T>(), "{n:?}: {error}");
+        }
+    }
+
     /// The basis turns by no more than a few times the angle by which a direction away from the pole turns.
     fn tangent_basis_is_continuous_but_at_the_pole<T>() {
         let pole = Vector3::new(-2.0, -1.0, -2.0) / 3.0;

@@ -256,8 +256,9 @@ pub fn tangent_basis<T: Real>(n: &Vector3<T>) -> Matrix3x2<T> {
     let start = Vector3::new(T::TWO, -T::TWO, -T::ONE) * third;
     let v = n + pole;
     let square = v.norm_squared();
-    let reflected =
-        if square > T::EPSILON * T::EPSILON { start - v * (T::TWO * v.dot(&start) / square) } else { start };
+    // Of a difference of a few roundings not even the direction is known; `start` is orthogonal to such an `n` as it is.
+    let known = square > T::EPSILON * T::EPSILON * lit(256.0);
+    let reflected = if known { start - v * (T::TWO * v.dot(&start) / square) } else { start };
     let e1 = reflected - n * n.dot(&reflected);
     let e1 = e1 * (T::ONE / sqrt(e1.norm_squared()));
     Matrix3x2::from_columns(&[e1, n.cross(&e1)])
