@@ -48,11 +48,11 @@ pub use workspace::{
     RelativePoseStorage, RelativePoseWorkspace, TwoViewStorage, TwoViewWorkspace, WideTwoViewStorage,
 };
 
-/// A stride near the golden ratio of `blocks` and coprime to it: steps of it visit every block once, and early ones
-/// are spread over the whole list, so that an order in the input (best match first) does not mislead the early exit.
-pub(crate) fn stride(blocks: usize) -> usize {
-    let first = blocks * 5 / 8;
-    (first..first + 64).find(|&stride| gcd(stride, blocks) == 1).unwrap_or(1)
+/// A stride near the golden ratio of `count` and coprime to it: steps of it visit every entry of a list once, and early ones
+/// are spread over the whole list, so that an order in the input (best match first) does not mislead an early exit.
+pub(crate) fn stride(count: usize) -> usize {
+    let first = count * 5 / 8;
+    (first..first + 64).find(|&stride| gcd(stride, count) == 1).unwrap_or(1)
 }
 
 fn gcd(mut a: usize, mut b: usize) -> usize {

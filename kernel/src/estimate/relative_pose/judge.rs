@@ -93,8 +93,8 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     }
 
     /// Writes verdict and noise, in the blocks' unit, of what a search found (in place, for a verdict is large), how a prior
-    /// that took part agrees with a general motion, and the inlier mask; uses `order` as memory. The report is that of the search; what more is spent is
-    /// added.
+    /// that took part agrees with a general motion, and the inlier mask; uses `order` as memory. The report is that of the
+    /// search; what more is spent is added.
     pub(super) fn judge(
         &self,
         consensus: &Consensus<PoseModel<T>, T>,
