@@ -162,7 +162,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
 
     /// Some of the blocks, and which of their correspondences agree with a pose.
     fn agreeing(&self, pose: &PoseModel<T>, blocks: usize) -> Agreeing {
-        let blocks = blocks.clamp(1, SAMPLED_BLOCKS);
+        let blocks = core::cmp::min(core::cmp::max(blocks, 1), SAMPLED_BLOCKS);
         let every = core::cmp::max(self.data.blocks.len().div_ceil(blocks), 1);
         let view = self.view(pose);
         let mut sample = Agreeing { every, lanes: [[false; LANES]; SAMPLED_BLOCKS], count: 0 };
