@@ -162,8 +162,8 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
 
     /// Some of the blocks, and which of their correspondences agree with a pose.
     fn agreeing(&self, pose: &PoseModel<T>, blocks: usize) -> Agreeing {
-        let blocks = core::cmp::min(core::cmp::max(blocks, 1), SAMPLED_BLOCKS);
-        let every = core::cmp::max(self.data.blocks.len().div_ceil(blocks), 1);
+        let blocks = core::cmp::min(blocks, SAMPLED_BLOCKS);
+        let every = core::cmp::max(self.data.blocks.len().div_ceil(core::cmp::max(blocks, 1)), 1);
         let view = self.view(pose);
         let mut sample = Agreeing { every, lanes: [[false; LANES]; SAMPLED_BLOCKS], count: 0 };
         let mut left = self.data.count;
@@ -189,7 +189,9 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
     ) -> u32 {
         let h = rotation.matrix();
         let mut turned = 0u32;
-        for (block, lanes) in self.data.blocks.iter().step_by(sample.every).zip(&sample.lanes) {
+        // At least one already, which the optimiser does not see through memory.
+        let every = core::cmp::max(sample.every, 1);
+        for (block, lanes) in self.data.blocks.iter().step_by(every).zip(&sample.lanes) {
             let (plane, weight) = block.planes();
             let squared = transfer_sq(&h, &plane, &weight);
             let mut explained = [false; LANES];
