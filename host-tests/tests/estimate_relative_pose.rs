@@ -1,14 +1,14 @@
 //! `estimate::relative_pose`: the truth, the verdicts, malformed input, determinism, budgets, covariance.
 
 use epipole::estimate::{
-    RelativePoseError, RelativePoseOptions, RelativePoseVerdict, Unobservable, refine_relative_pose,
-    relative_pose, relative_pose_guided,
+    RelativePoseError, RelativePoseOptions, RelativePosePrior, RelativePoseVerdict, Unobservable,
+    refine_relative_pose, relative_pose, relative_pose_guided,
 };
 use epipole::geometry::pose::tangent_basis;
 use epipole::geometry::{BrownConrady, CameraModel, KannalaBrandt, Pinhole, Pose};
 use epipole::nalgebra::{Point3, SVector, UnitQuaternion, Vector2, Vector3};
 use epipole::real::lit;
-use epipole::robust::{Guide, OptionsError, StopReason};
+use epipole::robust::{Guide, OptionsError, Progress, StopReason};
 use epipole::{InputError, Real};
 use epipole_host_tests::bundle::problem::cast_pose;
 use epipole_host_tests::matchers::pose_error;
@@ -127,6 +127,35 @@ fn determinism<T: Real>() {
     assert_eq!(repeated.0.report.stop, StopReason::MaxIterations);
     ended.0.report.stop = StopReason::MaxIterations;
     assert_eq!((bits(&ended.0), &ended.1), (bits(&repeated.0), &repeated.1));
+}
+
+/// What `keep_going` is told counts on where more samples follow, as they do on a plane and after a prior that is wrong.
+fn progress_counts_on<T: Real>() {
+    let problem = noisy(Motion::General, Shape::Plane).outliers(0.3).generate(3);
+    let (x1, x2) = problem.pixels::<T>();
+    let camera = scene_camera::<T>();
+    let down = Vector3::new(T::ZERO, T::ONE, T::ZERO);
+    let wrong = Vector3::new(T::ONE, T::ONE, T::ZERO);
+    for prior in [None, Some(RelativePosePrior::Gravity { view1: down, view2: wrong, sigma_rad: lit(0.01) })]
+    {
+        let mut memory = Memory::new(120);
+        let mut workspace = memory.workspace();
+        let mut options = options::<T>();
+        options.prior = prior;
+        let mut told = vec![0];
+        let mut keep_going = |progress: &Progress| {
+            told.push(progress.iterations);
+            true
+        };
+        let mut guide = Guide::none();
+        guide.keep_going = Some(&mut keep_going);
+        let estimate =
+            relative_pose_guided(&camera, &camera, &x1, &x2, &options, guide, &mut workspace).unwrap();
+        assert!(matches!(estimate.verdict, RelativePoseVerdict::Planar(_)));
+        assert!(told.is_sorted_by(|a, b| a < b), "{told:?}");
+        let last = told[told.len() - 1];
+        assert!((last..=last + Guide::<T>::INTERVAL).contains(&estimate.report.spent.iterations), "{told:?}");
+    }
 }
 
 /// Scores that rank the inliers first find the pose in fewer iterations.
@@ -260,6 +289,7 @@ both!(
     degenerate_scenes,
     planar_scenes,
     determinism,
+    progress_counts_on,
     ranked_sampling,
     malformed_input,
     extreme_numbers,

@@ -155,7 +155,15 @@ impl<T> Guide<'_, T> {
     }
 }
 
-/// What a run has spent so far.
+/// The question of a search that follows others, which is told what all of them have spent.
+pub(crate) fn after<'a>(
+    spent: Progress,
+    keep_going: &'a mut Option<&mut dyn FnMut(&Progress) -> bool>,
+) -> Option<impl FnMut(&Progress) -> bool + 'a> {
+    keep_going.as_mut().map(move |ask| move |now: &Progress| ask(&now.plus(&spent)))
+}
+
+/// What a run has spent so far. Where a relative pose takes several searches, each counts on from those before it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Progress {

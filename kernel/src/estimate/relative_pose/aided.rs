@@ -19,6 +19,7 @@ use crate::linalg::LANES;
 use crate::real::{abs, from_u32, lit, max, sqrt};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock};
 use crate::refine::relative_pose::PoseModel;
+use crate::robust::budget::after;
 use crate::robust::loss::Loss;
 use crate::robust::{
     Consensus, Estimator, Gate, Guide, Progress, RansacOptions, RansacReport, Score, ScoreCounts, StopReason,
@@ -266,7 +267,8 @@ pub(super) fn judge<T: Real, B: EpipolarBlock<T>>(
             estimate.prior = known.agreement(&estimate.verdict);
         }
         if let Some(PriorFit::Fits(_)) = estimate.prior {
-            let ask = keep_going.as_mut().map(|ask| &mut **ask as &mut dyn FnMut(&_) -> bool);
+            let mut ask = after(first.report.spent, &mut keep_going);
+            let ask = ask.as_mut().map(|ask| ask as &mut dyn FnMut(&_) -> bool);
             let rival = rival(plain.problem, &first, options, ask);
             let mut report = first.report;
             report.spent = spent.plus(&rival.spent);
@@ -286,8 +288,11 @@ pub(super) fn judge<T: Real, B: EpipolarBlock<T>>(
     if interrupted {
         left.budget.max_iterations = 0;
     }
-    let ask = keep_going.as_mut().map(|ask| &mut **ask as &mut dyn FnMut(&_) -> bool);
-    let second = ransac(plain.problem, &left, ranked(scores, order, mask.len()), LEAST_INLIERS, ask);
+    let second = {
+        let mut ask = after(spent, &mut keep_going);
+        let ask = ask.as_mut().map(|ask| ask as &mut dyn FnMut(&_) -> bool);
+        ransac(plain.problem, &left, ranked(scores, order, mask.len()), LEAST_INLIERS, ask)
+    };
     let total = |mut report: RansacReport<T>| {
         report.spent = second.report.spent.plus(&spent);
         report.spent.inliers = report.inliers;

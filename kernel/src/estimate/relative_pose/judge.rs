@@ -19,6 +19,7 @@ use crate::refine::blocks::EpipolarBlock;
 use crate::refine::homography::{RotationModel, transfer_sq};
 use crate::refine::lm::{Manifold, normal_equations};
 use crate::refine::relative_pose::PoseModel;
+use crate::robust::budget::after;
 use crate::robust::loss::Loss;
 use crate::robust::{
     Budget, Consensus, Estimator, Gate, Progress, RansacOptions, RansacReport, ScoreCounts, StopReason,
@@ -258,7 +259,8 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         let budget = Budget { max_iterations: samples, ..left.budget };
         let options =
             RansacOptions { seed: !self.seed, min_iterations: samples, budget, ..RansacOptions::default() };
-        let keep_going = left.keep_going.as_mut().map(|ask| &mut **ask as &mut dyn FnMut(&_) -> bool);
+        let mut ask = after(report.spent, &mut left.keep_going);
+        let keep_going = ask.as_mut().map(|ask| ask as &mut dyn FnMut(&_) -> bool);
         let found = ransac::<T, _, 5>(self.problem, &options, None, LEAST_INLIERS, keep_going);
         report.spent = report.spent.plus(&found.report.spent);
         if found.report.stop == StopReason::Interrupted {
