@@ -75,7 +75,9 @@ const ROTATION_ACCIDENTS: f64 = 1e-4;
 /// Accidents expected at the most where something off a plane counts as proven: to leave a plane that is one costs less than
 /// to hold one that is none.
 const PLANE_ACCIDENTS: f64 = 0.03;
-/// Where a plane explains most inliers, poses that differ hardly differ in cost: so many more samples look for a better one.
+/// Where a plane explains more inliers than this, poses that differ hardly differ in cost: as many samples again, so many at
+/// the most, look for a better one.
+const MORE_SHARE_OF_20: u32 = 16;
 const MORE_SAMPLES: u32 = 300;
 /// With how many others each correspondence is mispaired to measure what chance explains: at first, and where the verdict
 /// hangs on it.
@@ -197,7 +199,8 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                     turn + (twin.translation - refined.translation).norm_squared() < lit(SAME_POSE_SQ)
                 };
                 let mut better = None;
-                if planar && let Some(other) = self.another(left, &mut estimate.report) {
+                let hides = 20 * held > inliers * MORE_SHARE_OF_20;
+                if hides && let Some(other) = self.another(left, &mut estimate.report) {
                     let cost = self.cost(&other);
                     if cost < least {
                         (better, least) = (Some(other), cost);
@@ -255,7 +258,8 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         if report.stop != StopReason::Confident {
             return None;
         }
-        let samples = core::cmp::min(MORE_SAMPLES, left.budget.max_iterations);
+        let samples = core::cmp::min(MORE_SAMPLES, report.spent.iterations);
+        let samples = core::cmp::min(samples, left.budget.max_iterations);
         let budget = Budget { max_iterations: samples, ..left.budget };
         let options =
             RansacOptions { seed: !self.seed, min_iterations: samples, budget, ..RansacOptions::default() };
