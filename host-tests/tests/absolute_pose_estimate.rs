@@ -2,14 +2,14 @@
 
 use epipole::estimate::{
     AbsolutePoseError, AbsolutePoseEstimate, AbsolutePoseOptions, AbsolutePoseStorage, AbsolutePoseVerdict,
-    GravityPrior, PriorFit, Unobservable, WideAbsolutePoseStorage, absolute_pose,
+    GravityPrior, PriorFit, Unobservable, WideAbsolutePoseStorage, absolute_pose, absolute_pose_guided,
 };
 use epipole::geometry::pose::log;
 use epipole::geometry::{CameraModel, KannalaBrandt, Pinhole, Pose};
 use epipole::nalgebra::{Matrix6, Point3, Vector2, Vector3, Vector6};
 use epipole::real::lit;
 use epipole::refine::{PosePrior, RefineAbsolutePoseOptions, absolute_pose as refine_pose};
-use epipole::robust::OptionsError;
+use epipole::robust::{Guide, OptionsError, Progress};
 use epipole::{InputError, Real};
 use epipole_host_tests::matchers::{rotation_error, vector_f64};
 use epipole_host_tests::scenes::{AbsoluteScene, CENTRE, FOCAL, Motion, Scene, Shape};
@@ -122,6 +122,34 @@ in_both_scalars! {
             assert!(apart < 1e-3, "{apart}");
         });
         assert!(iterations[1] * 2 < iterations[0] || std::env::var("EPIPOLE_SEED").is_ok(), "{iterations:?}");
+    }
+
+    fn both_searches_of_a_prior_share_one_budget<T>() {
+        for_each_case(10, |seed, _| {
+            let p = problem(Shape::Volume, 1.0, 0.6, seed);
+            let (pixels, points) = (p.pixels::<T>(), p.points::<T>());
+            let mut options = options(3.0);
+            // Wrong by a right angle.
+            options.gravity = Some(GravityPrior { world: Vector3::y(), camera: Vector3::x(), sigma_rad: lit(0.009) });
+            for limit in [8, 40, 200, 2_000] {
+                let mut storage = AbsolutePoseStorage::<T, N>::new();
+                let mut asked = 0;
+                let mut keep_going = |spent: &Progress| {
+                    assert!(spent.iterations >= asked, "counts never start again");
+                    asked = spent.iterations;
+                    spent.iterations < limit
+                };
+                let guide = Guide { scores: None, keep_going: Some(&mut keep_going) };
+                let ended = absolute_pose_guided(&camera(), &pixels, &points, &options, guide, &mut storage.workspace())
+                    .expect("well-formed");
+                let mut again = options;
+                again.ransac.budget.max_iterations = ended.report.spent.iterations;
+                let again = run(&pixels, &points, &again);
+                assert_eq!((again.verdict, again.gravity), (ended.verdict, ended.gravity));
+                assert_eq!(again.report.spent.iterations, ended.report.spent.iterations);
+                assert!(ended.report.spent.iterations <= limit + 8);
+            }
+        });
     }
 
     fn malformed_input_is_named<T>() {

@@ -191,8 +191,9 @@ fn behind_camera<T: Real, B: ReprojectionBlock<T>>(
     let mirrored = PoseProblem { facing: -T::ONE, ..*problem };
     let mut options = task.options.ransac;
     let needed = iterations_needed(options.confidence, wanted, count, 3);
-    options.budget.max_iterations =
-        core::cmp::min(options.budget.max_iterations, core::cmp::min(needed, MAX_BEHIND));
+    // No more than the search itself took: a run that ended early is repeated by the iterations it reports.
+    let spent = in_front.report.spent.iterations;
+    options.budget.max_iterations = core::cmp::min(spent, core::cmp::min(needed, MAX_BEHIND));
     let behind = ransac::<T, _, 3>(&mirrored, &options, None, wanted, None);
     behind.report.inliers >= wanted && beyond_chance(task, &mirrored, &behind)
 }

@@ -10,10 +10,13 @@ use crate::Real;
 use crate::geometry::pose::upright;
 use crate::real::{from_u32, is_finite, lit};
 use crate::refine::reprojection::{CameraPose, ReprojectionBlock};
-use crate::robust::{Consensus, Progress, RansacOptions, ransac};
+use crate::robust::budget::after;
+use crate::robust::{Consensus, Progress, RansacOptions, StopReason, iterations_needed, ransac};
 
 /// Standard deviations beyond which a prior is contradicted.
 const PRIOR_SIGMAS: f64 = 4.0;
+/// One correspondence in so many agrees at the least where the search by the prior may find it.
+const LEAST_ONE_IN: u32 = 20;
 
 /// A gravity prior, checked.
 #[derive(Clone, Copy, Debug)]
@@ -59,16 +62,37 @@ pub(super) fn aided_search<T: Real, B: ReprojectionBlock<T>>(
         world: upright_frame(&gravity.direction.from),
         camera: upright_frame(&gravity.direction.to),
     };
+    // As many as a twentieth of inliers needs, so that something is left where the prior is wrong.
+    let count = problem.data.count as u32;
+    let least = core::cmp::max(count / LEAST_ONE_IN, NEEDED as u32);
+    let most = core::cmp::max(iterations_needed(options.confidence, least, count, 2), options.min_iterations);
+    let mut left = *options;
+    left.budget.max_iterations = core::cmp::min(options.budget.max_iterations, most);
     // Reborrowed, for the second search may need it.
-    let again = keep_going.as_mut().map(|ask| &mut **ask as &mut dyn FnMut(&_) -> bool);
-    let first = ransac::<T, _, 2>(&aided, options, order, NEEDED as u32, again);
+    let ask = keep_going.as_mut().map(|ask| &mut **ask as &mut dyn FnMut(&_) -> bool);
+    let mut first = ransac::<T, _, 2>(&aided, &left, order, NEEDED as u32, ask);
     let deviations = deviations_of(&first);
     // Where less than 30 % agree, or the optimum has left the prior, the prior must win against a search without it.
-    let share = from_u32::<T>(first.report.inliers) / from_u32(problem.data.count as u32);
+    let share = from_u32::<T>(first.report.inliers) / from_u32(count);
     if deviations < limit && share > lit(0.3) {
         return (first, Some(PriorFit::Fits(deviations)));
     }
-    let second = ransac::<T, _, 3>(problem, options, order, NEEDED as u32, keep_going);
+    let spent = first.report.spent;
+    left.budget = options.budget.less(&spent);
+    let interrupted = first.report.stop == StopReason::Interrupted;
+    if interrupted {
+        left.budget.max_iterations = 0;
+    }
+    let mut ask = after(spent, &mut keep_going);
+    let ask = ask.as_mut().map(|ask| ask as &mut dyn FnMut(&_) -> bool);
+    let mut second = ransac::<T, _, 3>(problem, &left, order, NEEDED as u32, ask);
+    // The report is of both: what is asked for again by its iterations is the same.
+    let total = spent.plus(&second.report.spent);
+    let stop = if interrupted { StopReason::Interrupted } else { second.report.stop };
+    for report in [&mut first.report, &mut second.report] {
+        report.spent = Progress { inliers: report.inliers, ..total };
+        report.stop = stop;
+    }
     let chosen = if second.report.cost < first.report.cost { second } else { first };
     let deviations = deviations_of(&chosen);
     let fit =
