@@ -19,7 +19,8 @@ use crate::{Real, Solutions};
 /// `d2 x2 = d1 R x1 + t` with `d1, d2 > 0`, `R` a rotation about y and |t| = 1.
 ///
 /// # Input
-/// `x1`, `x2`: bearings of any length, each in a camera frame that has been turned until gravity is along y.
+/// `x1`, `x2`: bearings of any length (in `f32` from 0.01 to 100,000), each in a camera frame that has been turned until
+/// gravity is along y.
 ///
 /// # Returns
 /// Poses of the (turned) frame 2 in the (turned) frame 1 that have all three points in front, in no particular order.

@@ -120,13 +120,15 @@ pub type RelativePoseError = TwoViewError;
 /// the few poses led astray.
 ///
 /// # Cost
-/// At most `max_iterations` samples, by itself as many as the confidence needs for the inliers found, and as many again, 300 at
-/// the most, where a plane holds more than 16 in 20 of those, for there poses that differ hardly differ in cost; all of them
-/// where nothing is found, which takes most of a second on a desktop computer by the default: firmware sets a budget, or
-/// [`Guide::keep_going`]. Beyond a budget of residuals at most one refinement (five passes over 256 correspondences at the
-/// most, one score of all, and seven passes over 32 to try a rotation; with a prior four passes over all), and the verdict's
-/// passes. A budget of fewer than n residuals, of 4 n with a prior, scores nothing. At half outliers a prior takes less than a third of
-/// the samples; a contradicted one costs its own search, of as many samples as a fifth of inliers needs, and one more verdict.
+/// At most `max_iterations` samples, by itself as many as the confidence needs for the inliers found, and without a
+/// prior as many again, 300 at the most, where a plane holds more than 16 in 20 of those, for there poses that differ
+/// hardly differ in cost; all of them where nothing is found, which by the default takes a third of a second for 200
+/// correspondences on a desktop computer: firmware sets a budget, or [`Guide::keep_going`]. Beyond a budget of
+/// residuals at most one refinement (five passes over 256 correspondences at the most, one score of all, and seven
+/// passes over 32 to try a rotation; with a prior four passes over all), and the verdict's passes. A budget of fewer
+/// than n residuals, of 4 n with a prior, scores nothing. At half outliers a prior takes less than a third of the
+/// samples; a contradicted one costs its own search, of as many samples as a fifth of inliers needs, and one more
+/// verdict.
 ///
 /// # References
 /// D. Nister, "An efficient solution to the five-point relative pose problem", TPAMI 2004 (the minimal problem);
