@@ -273,7 +273,7 @@ pub(super) fn judge<T: Real, B: EpipolarBlock<T>>(
             let mut report = first.report;
             report.spent = spent.plus(&rival.spent);
             interrupted = rival.stop == StopReason::Interrupted;
-            if interrupted {
+            if rival.stop != StopReason::Confident {
                 report.stop = rival.stop;
             }
             if !(rival.cost < first.report.cost) {
@@ -337,8 +337,14 @@ fn rival<T: Real, B: EpipolarBlock<T>>(
     options.budget = options.budget.less(&found.report.spent);
     let needed =
         if inliers < count { iterations_needed::<T>(lit(RIVAL_CONFIDENCE), inliers, count, 5) } else { 0 };
-    options.budget.max_iterations = core::cmp::min(options.budget.max_iterations, needed);
-    ransac::<T, _, 5>(problem, &options, None, inliers, keep_going).report
+    let samples = core::cmp::min(options.budget.max_iterations, needed);
+    options.budget.max_iterations = samples;
+    let mut report = ransac::<T, _, 5>(problem, &options, None, inliers, keep_going).report;
+    // As many as were wanted, so that the budget has not ended it.
+    if samples == needed && report.stop == StopReason::MaxIterations {
+        report.stop = StopReason::Confident;
+    }
+    report
 }
 
 /// The order of the correspondences by their scores, in the memory given.

@@ -258,8 +258,8 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         if report.stop != StopReason::Confident {
             return None;
         }
-        let samples = core::cmp::min(MORE_SAMPLES, report.spent.iterations);
-        let samples = core::cmp::min(samples, left.budget.max_iterations);
+        let wanted = core::cmp::min(MORE_SAMPLES, report.spent.iterations);
+        let samples = core::cmp::min(wanted, left.budget.max_iterations);
         let budget = Budget { max_iterations: samples, ..left.budget };
         let options =
             RansacOptions { seed: !self.seed, min_iterations: samples, budget, ..RansacOptions::default() };
@@ -267,9 +267,11 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         let keep_going = ask.as_mut().map(|ask| ask as &mut dyn FnMut(&_) -> bool);
         let found = ransac::<T, _, 5>(self.problem, &options, None, LEAST_INLIERS, keep_going);
         report.spent = report.spent.plus(&found.report.spent);
-        if found.report.stop == StopReason::Interrupted {
-            report.stop = StopReason::Interrupted;
-        }
+        report.stop = match found.report.stop {
+            StopReason::Confident | StopReason::MaxIterations if samples == wanted => report.stop,
+            StopReason::Confident => StopReason::MaxIterations,
+            other => other,
+        };
         found.best.map(|(model, _)| self.refine(&model, REFINE_PASSES))
     }
 
