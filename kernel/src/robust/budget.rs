@@ -163,7 +163,7 @@ pub(crate) fn after<'a>(
     keep_going.as_mut().map(move |ask| move |now: &Progress| ask(&now.plus(&spent)))
 }
 
-/// What a run has spent so far. Where a relative pose takes several searches, each counts on from those before it.
+/// What a run has spent so far. Where an estimate takes several searches, each counts on from those before it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Progress {

@@ -48,6 +48,8 @@ pub(super) struct Spread<T> {
     pub(super) noise: T,
     /// The factor of `(J' J)^-1` in the covariance.
     pub(super) variance: T,
+    /// Residuals within the support.
+    pub(super) count: u32,
 }
 
 impl<T: Real> PsiSums<T> {
@@ -77,7 +79,7 @@ impl<T: Real> PsiSums<T> {
         // Residuals spread over the whole support leave no slope: then nothing better than the support is known.
         let slope = max(self.slope, n * lit(0.05));
         if self.count == 0 {
-            return Spread { noise: T::ZERO, variance: T::ZERO };
+            return Spread { noise: T::ZERO, variance: T::ZERO, count: 0 };
         }
         let scale = support * support * fitted;
         // Huber's correction for few residuals: 1 + p / n var(psi') / E[psi']^2.
@@ -90,6 +92,7 @@ impl<T: Real> PsiSums<T> {
                 * correction
                 * correction
                 * student(self.count.saturating_sub(freedom)),
+            count: self.count,
         }
     }
 }

@@ -6,7 +6,7 @@ use super::super::chance::{EXPLAINED_SIGMAS, beyond_chance, line_accident};
 use super::super::degenerate::{few_distinct, list, on_a_line};
 use super::super::prior::PriorFit;
 use super::LEAST_INLIERS;
-use super::covariance::{PsiSums, covariance, variance};
+use super::covariance::{PsiSums, Spread, covariance, variance};
 use super::evidence::{Evidence, Explained};
 use super::hypothesis::{PoseProblem, SAMPLED_BLOCKS};
 use super::verdict::{GeneralMotion, PureRotation, RelativePoseEstimate, RelativePoseVerdict, Unobservable};
@@ -54,9 +54,12 @@ impl Left<'_> {
 /// Error of an inlier in two dimensions over the threshold: as likely for a true correspondence as the threshold is in
 /// one (chi-squared at 95 %: sqrt(5.99 / 3.84)).
 const PLANE_THRESHOLD: f64 = 1.25;
-/// Where the loss of the last refinement ends, in standard deviations of the noise: of Gaussian noise hardly anything is
-/// lost; and the least and largest such place, in thresholds.
-const SUPPORT_SIGMAS: f64 = 6.0;
+/// Where the loss of the last refinement ends, in standard deviations of the noise: of many correspondences, and of `FEW`
+/// and less, of which it loses hardly anything. What wrong ones add to the error does not fall with their number, as the
+/// noise's part does.
+const SUPPORT_SIGMAS: [f64; 2] = [3.5, 6.0];
+const FEW: u32 = 150;
+/// The least and largest such place, in thresholds.
 const SUPPORT: [f64; 2] = [0.8, 2.6];
 /// Passes of the last refinement at the most.
 const REFINE_PASSES: u32 = 10;
@@ -139,7 +142,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         let count = problem.data.count as u32;
         let mut refined = self.refine(best, REFINE_PASSES);
         let mut accident = problem.accident(&refined, self.accident(), MISPAIRED);
-        let (inliers, mut noise) = self.mark(&refined, mask);
+        let (inliers, mut spread) = self.mark(&refined, mask);
         if !beyond_chance(count, inliers, 5, accident) {
             accident = problem.accident(&refined, self.accident(), MISPAIRED_MORE);
         }
@@ -158,9 +161,9 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
             mask.iter_mut().for_each(|inlier| *inlier = false);
             return;
         }
-        estimate.noise_px = noise;
+        estimate.noise_px = spread.noise;
         // Where the options promise less noise than there is, the data are believed.
-        let sigma = max(self.sigma, noise);
+        let sigma = max(self.sigma, spread.noise);
         let indices = list(mask, order);
         if few_distinct(problem.data, &mut indices.iter().copied(), 5, sigma, accident) {
             estimate.verdict = RelativePoseVerdict::Unobservable(Unobservable::TooFewDistinct);
@@ -225,7 +228,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                 }
                 if let Some(better) = better {
                     refined = better;
-                    noise = self.mark(&refined, mask).1;
+                    spread = self.mark(&refined, mask).1;
                 }
                 if planar && let Some(twin) = twins.first() {
                     // The plane's own lines: those of the pose are the ones that the noise happens to lie along.
@@ -235,7 +238,8 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                     let explained = evidence.explained(&plane.0);
                     let share =
                         explained.inliers * 20 >= (explained.inliers + explained.others) * PLANE_SHARE_OF_20;
-                    let bends = evidence.bends(&plane.0, &refined.matrix(), max(noise, sigma * T::HALF));
+                    let bends =
+                        evidence.bends(&plane.0, &refined.matrix(), max(spread.noise, sigma * T::HALF));
                     if share
                         && !bends
                         && !evidence.proves_parallax(count, &explained, 8, lit(PLANE_ACCIDENTS))
@@ -245,7 +249,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                 }
             }
         }
-        let (motion, noise, fit) = self.motion(&refined, noise);
+        let (motion, noise, fit) = self.motion(&refined, &spread);
         estimate.verdict = RelativePoseVerdict::General(motion);
         estimate.noise_px = noise;
         estimate.prior = fit;
@@ -277,7 +281,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
 
     /// The pose that all inliers support, with what lies just beyond the threshold at a falling weight.
     pub(super) fn refine(&self, model: &PoseModel<T>, passes: u32) -> PoseModel<T> {
-        let loss = Loss::Tukey(self.support(self.noise(model)));
+        let loss = Loss::Tukey(self.support(&self.spread(model)));
         // The last step is worth a hundredth of a correspondence.
         let tolerance = max(lit::<T>(1e-2) / from_u32(self.problem.data.count as u32), lit(1e-5));
         self.problem.optimise(model, &loss, passes, tolerance).model
@@ -291,18 +295,18 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
             start.translation *= T::ONE / length;
             self.refine(&start, REFINE_PASSES)
         });
-        let (inliers, noise) = refined.map_or((0, T::ZERO), |model| self.mark(&model, mask));
-        if inliers < 6 {
+        let marked = refined.map(|model| (model, self.mark(&model, mask)));
+        let Some((model, (6.., spread))) = marked else {
             mask.iter_mut().for_each(|inlier| *inlier = false);
             return None;
-        }
-        let motion = self.motion(&refined?, noise).0;
+        };
+        let motion = self.motion(&model, &spread).0;
         motion.covariance.map(|_| motion)
     }
 
     /// A refined pose with its covariance, the noise more precisely, and how a prior that took part agrees.
-    fn motion(&self, model: &PoseModel<T>, noise: T) -> (GeneralMotion<T>, T, Option<PriorFit<T>>) {
-        let support = self.support(noise);
+    fn motion(&self, model: &PoseModel<T>, seen: &Spread<T>) -> (GeneralMotion<T>, T, Option<PriorFit<T>>) {
+        let support = self.support(seen);
         let spread = self.sums(model, support).spread(support, 5);
         let loss = Loss::Truncated(support);
         let mut sums = normal_equations(self.problem.data, model, &loss);
@@ -316,16 +320,19 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     }
 
     /// Where the loss about a pose ends: as far as the noise of these correspondences reaches.
-    fn support(&self, noise: T) -> T {
+    fn support(&self, seen: &Spread<T>) -> T {
         let threshold = self.problem.threshold;
+        let few = from_u32::<T>(FEW) / from_u32(core::cmp::max(seen.count, FEW));
+        let [near, far]: [T; 2] = SUPPORT_SIGMAS.map(lit);
+        let sigmas = near + (far - near) * few;
         let [least, largest] = [threshold * lit(SUPPORT[0]), threshold * lit(SUPPORT[1])];
-        min(max(noise * lit(SUPPORT_SIGMAS), least), largest)
+        min(max(seen.noise * sigmas, least), largest)
     }
 
-    /// The noise about a pose, from what lies within two thresholds.
-    pub(super) fn noise(&self, model: &PoseModel<T>) -> T {
+    /// The noise about a pose, from what lies within two thresholds, and how many do.
+    pub(super) fn spread(&self, model: &PoseModel<T>) -> Spread<T> {
         let support = self.problem.threshold * T::TWO;
-        self.sums(model, support).spread(support, 5).noise
+        self.sums(model, support).spread(support, 5)
     }
 
     /// What the residuals about a pose say about the noise, by a loss that ends at `support`.
@@ -347,8 +354,8 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         score.map_or(T::MAX, |score| score.cost + prior)
     }
 
-    /// Writes the pose's inliers; how many they are, and the [`noise`](Self::noise).
-    fn mark(&self, model: &PoseModel<T>, mask: &mut [bool]) -> (u32, T) {
+    /// Writes the pose's inliers; how many they are, and the [`spread`](Self::spread).
+    fn mark(&self, model: &PoseModel<T>, mask: &mut [bool]) -> (u32, Spread<T>) {
         let mut entries = mask.iter_mut();
         let (mut inliers, mut sums) = (0, PsiSums::default());
         self.problem.for_each_block(model, |_, squared, filled| {
@@ -358,7 +365,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                 sums.add(s * lit(0.25));
             }
         });
-        (inliers, sums.spread(self.problem.threshold * T::TWO, 5).noise)
+        (inliers, sums.spread(self.problem.threshold * T::TWO, 5))
     }
 
     /// Writes the inliers of `x2 ~ H x1`.
