@@ -108,8 +108,13 @@ fn judged<T: Real, B: ReprojectionBlock<T>>(
         return estimate;
     };
     estimate.gravity = fit;
-    let loss = Loss::Truncated(problem.threshold);
-    let best = problem.optimise(&model, &loss, gravity, 12, lit(1e-6));
+    // A pose where Tukey's loss is least, which no single correspondence at the threshold moves; its inliers' equations.
+    let refined = |model: &CameraPose<T>, passes: u32| {
+        let wide = Loss::Tukey(problem.threshold * T::TWO);
+        let model = problem.optimise(model, &wide, gravity, passes, lit(1e-6)).model;
+        problem.optimise(&model, &Loss::Truncated(problem.threshold), gravity, 1, T::ZERO)
+    };
+    let best = refined(&model, 12);
     let mut entries = mask.iter_mut();
     problem.for_each_block(&best.model, |_, relative, filled| {
         for (inlier, &s) in entries.by_ref().take(filled).zip(relative) {
@@ -132,7 +137,7 @@ fn judged<T: Real, B: ReprojectionBlock<T>>(
         Shape::Line => AbsolutePoseVerdict::Unobservable(Unobservable::Collinear),
         Shape::Volume => AbsolutePoseVerdict::Pose(first),
         Shape::Flat { twin } => {
-            let second = problem.optimise(&twin, &loss, gravity, 20, lit(1e-6));
+            let second = refined(&twin, 20);
             let turned = (second.model.rotation - best.model.rotation).norm_squared();
             let moved = (second.model.translation - best.model.translation).norm_squared();
             let same = turned < lit(1e-4) && moved < lit::<T>(1e-4) * best.model.translation.norm_squared();

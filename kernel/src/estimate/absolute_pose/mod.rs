@@ -48,8 +48,8 @@ const NEEDED: usize = 4;
 /// alike: `PlanarAmbiguity` with both. Points that fit only behind the camera: `BehindCamera`.
 ///
 /// # Accuracy
-/// That of least squares on the inliers: no pose of less truncated squared error is near. Distortion is removed from
-/// the pixels beforehand; [`refine::absolute_pose`](crate::refine::absolute_pose) measures in the distorted image.
+/// That of a maximum-likelihood fit to the inliers (Tukey's loss, ending at two thresholds). Distortion is removed from the
+/// pixels beforehand; [`refine::absolute_pose`](crate::refine::absolute_pose) measures in the distorted image.
 ///
 /// # Cost
 /// Bounded by [`Budget`](crate::robust::Budget). With gravity the search by two correspondences takes as many samples as a
