@@ -11,7 +11,7 @@ use crate::robust::Sampler;
 /// Lines tried, each through two inliers.
 const LINES: u32 = 24;
 /// Where hardly a point may lie off a line, so many more than half of those looked at end the look.
-const FEW_OFF: u32 = 8;
+const FEW_OFF: u32 = 5;
 /// Distinct points looked for at the most.
 const DISTINCT: usize = 12;
 /// Points of repetitions lie within this many standard deviations of each other.
@@ -97,10 +97,10 @@ pub(super) fn on_a_line<T: Real, B: EpipolarBlock<T>>(
     data: BlockSlice<'_, B>,
     inliers: &[u32],
     sigma: T,
-    accident: T,
+    accident: &dyn Fn() -> T,
 ) -> bool {
     let outside = (data.count as u32).saturating_sub(inliers.len() as u32);
-    line_with(data, inliers, sigma, FEW_OFF, &|off| !beyond_chance(outside + off, off, 2, accident))
+    line_with(data, inliers, sigma, FEW_OFF, &|off| !beyond_chance(outside + off, off, 2, accident()))
 }
 
 /// True where at least half of all correspondences, and more than chance explains, lie on one line in both views,
@@ -181,7 +181,7 @@ pub(super) fn few_distinct<T: Real, B: EpipolarBlock<T>>(
     inliers: &mut dyn Iterator<Item = u32>,
     needed: u32,
     sigma: T,
-    accident: T,
+    accident: &dyn Fn() -> T,
 ) -> bool {
     let radius = sigma * lit(REPEATED_SIGMAS);
     let mut centres = [[T::ZERO; 4]; DISTINCT];
@@ -255,7 +255,7 @@ pub(super) fn few_distinct<T: Real, B: EpipolarBlock<T>>(
         rest = rest.saturating_sub(largest);
         let wrong = (data.count as u32).saturating_sub(total);
         let repeated = largest > 1 && 2 * rest <= total;
-        if repeated && !beyond_chance(rest + wrong, rest, needed - taken, accident) {
+        if repeated && !beyond_chance(rest + wrong, rest, needed - taken, accident()) {
             return true;
         }
     }
@@ -326,9 +326,9 @@ mod tests {
             }
         }
         let data = BlockSlice { blocks: &blocks, count: 2000 };
-        assert!(on_a_line(data, &order, 1.0, 0.05));
+        assert!(on_a_line(data, &order, 1.0, &|| 0.05));
         let backwards = order.map(|i| 229 - i);
-        assert!(on_a_line(data, &backwards, 1.0, 0.05));
-        assert!(!on_a_line(data, &order, 1.0, 1e-4));
+        assert!(on_a_line(data, &backwards, 1.0, &|| 0.05));
+        assert!(!on_a_line(data, &order, 1.0, &|| 1e-4));
     }
 }

@@ -71,8 +71,18 @@ pub(crate) struct BlockSlice<'a, B> {
 
 /// Four correspondences under an epipolar constraint.
 pub(crate) trait EpipolarBlock<T: Real>: Block<T> {
-    /// `(c, d)` of the Sampson error: `r^2 = c^2 / d`.
-    fn residual(&self, f: &Matrix3<T>) -> (Lanes<T>, Lanes<T>);
+    /// `(c, d)` of the Sampson error of a lane: `r^2 = c^2 / d`.
+    fn residual_of(&self, f: &Matrix3<T>, lane: usize) -> (T, T);
+
+    /// The same of all lanes.
+    #[cfg_attr(not(small), inline(always))]
+    fn residual(&self, f: &Matrix3<T>) -> (Lanes<T>, Lanes<T>) {
+        let (mut c, mut d) = ([T::ZERO; LANES], [T::ZERO; LANES]);
+        for l in 0..LANES {
+            (c[l], d[l]) = self.residual_of(f, l);
+        }
+        (c, d)
+    }
 
     /// `c`, `1 / d` and `sqrt(d)` times the gradient of `r` by the entries of `f`, row by row.
     fn gradient(&self, f: &Matrix3<T>, lane: usize) -> (T, T, [T; 9]);
@@ -181,21 +191,16 @@ fn plane_lines<T: Real>(
 }
 
 impl<T: Real> EpipolarBlock<T> for PlaneBlock<T> {
-    #[cfg_attr(not(small), inline(always))]
-    fn residual(&self, f: &Matrix3<T>) -> (Lanes<T>, Lanes<T>) {
+    #[inline(always)]
+    fn residual_of(&self, f: &Matrix3<T>, l: usize) -> (T, T) {
         let m = &f.data.0;
-        let (mut c, mut d) = ([T::ZERO; LANES], [T::ZERO; LANES]);
-        for l in 0..LANES {
-            let (x1, y1, x2, y2) = (self[0][l], self[1][l], self[2][l], self[3][l]);
-            let a = m[0][0] * x1 + m[1][0] * y1 + m[2][0];
-            let b = m[0][1] * x1 + m[1][1] * y1 + m[2][1];
-            let e = m[0][2] * x1 + m[1][2] * y1 + m[2][2];
-            let p = m[0][0] * x2 + m[0][1] * y2 + m[0][2];
-            let q = m[1][0] * x2 + m[1][1] * y2 + m[1][2];
-            c[l] = x2 * a + y2 * b + e;
-            d[l] = (a * a + b * b) + (p * p + q * q);
-        }
-        (c, d)
+        let (x1, y1, x2, y2) = (self[0][l], self[1][l], self[2][l], self[3][l]);
+        let a = m[0][0] * x1 + m[1][0] * y1 + m[2][0];
+        let b = m[0][1] * x1 + m[1][1] * y1 + m[2][1];
+        let e = m[0][2] * x1 + m[1][2] * y1 + m[2][2];
+        let p = m[0][0] * x2 + m[0][1] * y2 + m[0][2];
+        let q = m[1][0] * x2 + m[1][1] * y2 + m[1][2];
+        (x2 * a + y2 * b + e, (a * a + b * b) + (p * p + q * q))
     }
 
     #[inline(always)]
@@ -313,16 +318,11 @@ fn bearing_lines<T: Real>(
 }
 
 impl<T: Real> EpipolarBlock<T> for BearingBlock<T> {
-    #[cfg_attr(not(small), inline(always))]
-    fn residual(&self, f: &Matrix3<T>) -> (Lanes<T>, Lanes<T>) {
-        let (mut c, mut d) = ([T::ZERO; LANES], [T::ZERO; LANES]);
-        for l in 0..LANES {
-            let (_, f2, l1, l2) = lines(self, f, l);
-            let (n1, n2) = metrics(self, l, &l1, &l2);
-            c[l] = dot(&f2, &l2);
-            d[l] = dot(&l2, &n2) + dot(&l1, &n1);
-        }
-        (c, d)
+    #[inline(always)]
+    fn residual_of(&self, f: &Matrix3<T>, l: usize) -> (T, T) {
+        let (_, f2, l1, l2) = lines(self, f, l);
+        let (n1, n2) = metrics(self, l, &l1, &l2);
+        (dot(&f2, &l2), dot(&l2, &n2) + dot(&l1, &n1))
     }
 
     #[inline(always)]

@@ -6,7 +6,6 @@ use super::blocks::EpipolarBlock;
 use super::lm::{EpipolarModel, Manifold, Row};
 use crate::Real;
 use crate::geometry::pose::tangent_basis;
-use crate::linalg::LANES;
 use crate::linalg::least_singular3;
 use crate::real::sqrt;
 
@@ -107,13 +106,9 @@ impl<T: Real> EpipolarModel<T, 7> for FundamentalModel<T> {
     }
 
     #[cfg_attr(not(small), inline(always))]
-    fn inside<B: EpipolarBlock<T>>((matrix, _): &Self::Frame, block: &B, limit: T) -> [bool; LANES] {
-        let (c, d) = block.residual(matrix);
-        let mut inside = [false; LANES];
-        for l in 0..LANES {
-            inside[l] = c[l] * c[l] < limit * d[l];
-        }
-        inside
+    fn inside<B: EpipolarBlock<T>>((matrix, _): &Self::Frame, block: &B, l: usize, limit: T) -> bool {
+        let (c, d) = block.residual_of(matrix, l);
+        c * c < limit * d
     }
 
     #[inline(always)]

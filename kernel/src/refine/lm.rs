@@ -28,9 +28,9 @@ pub(crate) trait EpipolarModel<T: Real, const P: usize>: Manifold<T, P> {
     type Frame;
     /// What a pass over the data needs of the model.
     fn frame(&self) -> Self::Frame;
-    /// Which correspondences of a block have a squared residual below `limit`, and may be explained by the model at all (are in
-    /// front of the cameras).
-    fn inside<B: EpipolarBlock<T>>(frame: &Self::Frame, block: &B, limit: T) -> [bool; LANES];
+    /// Whether a correspondence has a squared residual below `limit`, and may be explained by the model at all (is in front of
+    /// the cameras).
+    fn inside<B: EpipolarBlock<T>>(frame: &Self::Frame, block: &B, lane: usize, limit: T) -> bool;
     /// The residual of a correspondence and its derivatives.
     fn row<B: EpipolarBlock<T>>(frame: &Self::Frame, block: &B, lane: usize) -> Row<T, P>;
     /// Sums by the parameters of the rows, as sums by those of the model.
@@ -105,8 +105,26 @@ impl<T: Real, const P: usize> Sums<T, P> {
     const ZERO: Self =
         Self { hessian: [[[T::ZERO; LANES]; P]; P], gradient: [[T::ZERO; LANES]; P], cost: [T::ZERO; LANES] };
 
-    /// Adds the lanes of a block of which the first `filled` count: side by side, or where a core has no registers for that one
-    /// after the other, each in registers from the pixels to the sums. The sums are the same.
+    /// Adds a correspondence to a lane.
+    #[cfg_attr(not(small), inline(always))]
+    #[cfg_attr(small, inline(never))]
+    fn add_row(&mut self, l: usize, row: &Row<T, P>, loss: &Loss<T>) {
+        let Row { c, inverse, j } = *row;
+        let (cost, weight) = loss.evaluate(c * c * inverse);
+        self.cost[l] += cost;
+        let w = weight * inverse;
+        for p in 0..P {
+            let weighted = w * j[p];
+            self.gradient[p][l] += weighted * c;
+            for q in 0..P {
+                if q <= p {
+                    self.hessian[p][q][l] += weighted * j[q];
+                }
+            }
+        }
+    }
+
+    /// Adds the lanes of a block of which the first `filled` count, side by side.
     #[cfg_attr(not(small), inline(always))]
     fn add<B: EpipolarBlock<T>, M: EpipolarModel<T, P>>(
         &mut self,
@@ -115,26 +133,6 @@ impl<T: Real, const P: usize> Sums<T, P> {
         loss: &Loss<T>,
         filled: usize,
     ) {
-        if cfg!(scalar) {
-            for l in 0..LANES {
-                if l < filled {
-                    let Row { c, inverse, j } = M::row(frame, block, l);
-                    let (cost, weight) = loss.evaluate(c * c * inverse);
-                    self.cost[l] += cost;
-                    let w = weight * inverse;
-                    for p in 0..P {
-                        let weighted = w * j[p];
-                        self.gradient[p][l] += weighted * c;
-                        for q in 0..P {
-                            if q <= p {
-                                self.hessian[p][q][l] += weighted * j[q];
-                            }
-                        }
-                    }
-                }
-            }
-            return;
-        }
         let (mut c, mut inverse, mut j) = ([T::ZERO; LANES], [T::ZERO; LANES], [[T::ZERO; LANES]; P]);
         for l in 0..LANES {
             let row = M::row(frame, block, l);
@@ -165,6 +163,119 @@ impl<T: Real, const P: usize> Sums<T, P> {
                 }
             }
         }
+    }
+
+    /// Adds every `step`-th block: how many correspondences have a weight, and how many were looked at. Those of blocks of
+    /// which others are left out are packed into full blocks first.
+    #[cfg_attr(not(small), inline(always))]
+    fn add_in_lanes<B: EpipolarBlock<T>, M: EpipolarModel<T, P>>(
+        &mut self,
+        frame: &M::Frame,
+        data: BlockSlice<'_, B>,
+        step: usize,
+        loss: &Loss<T>,
+        limit: T,
+    ) -> (u32, usize) {
+        let (mut active, mut seen) = (0u32, 0usize);
+        let mut pending = B::zero();
+        let mut filled = 0usize;
+        let mut left = data.count;
+        // After the last block what is pending; one place for the derivatives keeps the code small.
+        for block in data.blocks.iter().step_by(step).map(Some).chain(core::iter::once(None)) {
+            let packed;
+            let (current, lanes) = if let Some(block) = block {
+                let mut inside = [false; LANES];
+                for l in 0..LANES {
+                    inside[l] = M::inside(frame, block, l, limit) & (l < left);
+                }
+                seen += core::cmp::min(left, LANES);
+                left = left.saturating_sub(step.saturating_mul(LANES));
+                if inside == [false; LANES] {
+                    continue;
+                }
+                if inside == [true; LANES] {
+                    active += LANES as u32;
+                    (block, LANES)
+                } else {
+                    let mut ready = None;
+                    for l in 0..LANES {
+                        if inside[l] {
+                            pending.set_lane(filled, block, l);
+                            filled += 1;
+                            active += 1;
+                            if filled == LANES {
+                                ready = Some(pending);
+                                filled = 0;
+                            }
+                        }
+                    }
+                    let Some(full) = ready else { continue };
+                    packed = full;
+                    (&packed, LANES)
+                }
+            } else {
+                (&pending, filled)
+            };
+            if lanes > 0 {
+                self.add::<B, M>(frame, current, loss, lanes);
+            }
+        }
+        (active, seen)
+    }
+
+    /// The same sums, bit for bit, where a core has no registers for lanes side by side: one correspondence after the other,
+    /// each in registers from the pixels to its row.
+    #[cfg_attr(not(small), inline(always))]
+    fn add_in_turn<B: EpipolarBlock<T>, M: EpipolarModel<T, P>>(
+        &mut self,
+        frame: &M::Frame,
+        data: BlockSlice<'_, B>,
+        step: usize,
+        loss: &Loss<T>,
+        limit: T,
+    ) -> (u32, usize) {
+        let (mut active, mut seen) = (0u32, 0usize);
+        let none = Row { c: T::ZERO, inverse: T::ZERO, j: [T::ZERO; P] };
+        let (mut pending, mut filled) = ([none; LANES], 0usize);
+        let mut left = data.count;
+        for block in data.blocks.iter().step_by(step) {
+            let (mut rows, mut found) = ([none; LANES], 0usize);
+            for l in 0..LANES {
+                if l < left && M::inside(frame, block, l, limit) {
+                    if let Some(place) = rows.get_mut(found) {
+                        *place = M::row(frame, block, l);
+                    }
+                    found += 1;
+                }
+            }
+            seen += core::cmp::min(left, LANES);
+            left = left.saturating_sub(step.saturating_mul(LANES));
+            active += found as u32;
+            if found == LANES {
+                for l in 0..LANES {
+                    self.add_row(l, &rows[l], loss);
+                }
+                continue;
+            }
+            for row in rows.iter().take(found) {
+                if let Some(place) = pending.get_mut(filled) {
+                    *place = *row;
+                }
+                filled += 1;
+                if filled == LANES {
+                    filled = 0;
+                    for l in 0..LANES {
+                        self.add_row(l, &pending[l], loss);
+                    }
+                }
+            }
+        }
+        for l in 0..LANES {
+            if l < filled {
+                self.add_row(l, &pending[l], loss);
+            }
+        }
+        (active, seen)
     }
 }
 
@@ -206,50 +317,11 @@ where
     let mut sums = Sums::<T, P>::ZERO;
     let support = loss.support();
     let limit = support.unwrap_or(T::MAX);
-    let (mut active, mut seen) = (0u32, 0usize);
-    let mut pending = B::zero();
-    let mut filled = 0usize;
-    let mut left = data.count;
-    // After the last block what is pending; one place for the derivatives keeps the code small.
-    for block in data.blocks.iter().step_by(step).map(Some).chain(core::iter::once(None)) {
-        let packed;
-        let (current, lanes) = if let Some(block) = block {
-            let mut inside = M::inside(&frame, block, limit);
-            for l in 0..LANES {
-                inside[l] &= l < left;
-            }
-            seen += core::cmp::min(left, LANES);
-            left = left.saturating_sub(step.saturating_mul(LANES));
-            if inside == [false; LANES] {
-                continue;
-            }
-            if inside == [true; LANES] {
-                active += LANES as u32;
-                (block, LANES)
-            } else {
-                let mut ready = None;
-                for l in 0..LANES {
-                    if inside[l] {
-                        pending.set_lane(filled, block, l);
-                        filled += 1;
-                        active += 1;
-                        if filled == LANES {
-                            ready = Some(pending);
-                            filled = 0;
-                        }
-                    }
-                }
-                let Some(full) = ready else { continue };
-                packed = full;
-                (&packed, LANES)
-            }
-        } else {
-            (&pending, filled)
-        };
-        if lanes > 0 {
-            sums.add::<B, M>(&frame, current, loss, lanes);
-        }
-    }
+    let (active, seen) = if cfg!(scalar) {
+        sums.add_in_turn::<B, M>(&frame, data, step, loss, limit)
+    } else {
+        sums.add_in_lanes::<B, M>(&frame, data, step, loss, limit)
+    };
     let mut equations = NormalEquations::zero();
     for p in 0..P {
         equations.gradient.data.0[0][p] = total(&sums.gradient[p]);
@@ -271,14 +343,14 @@ where
 pub(crate) struct Minimum<M, T: Real, const P: usize> {
     /// The best model.
     pub(crate) model: M,
-    /// The sums there.
+    /// The sums there, or before a last step too small for another pass.
     pub(crate) equations: NormalEquations<T, P>,
     /// Passes over the data.
     pub(crate) passes: u32,
 }
 
-/// Minimises the loss from `start` in at most `max_passes` passes over the data; ends where a step lowers the cost by
-/// less than the share `tolerance`.
+/// Minimises the loss from `start` in at most `max_passes` passes over the data; ends with a step that lowers the cost, or
+/// promises to, by less than the share `tolerance`.
 pub(crate) fn minimise<T, B, M, const P: usize>(
     data: BlockSlice<'_, B>,
     start: &M,
@@ -319,11 +391,12 @@ where
             best.passes += 1;
             continue;
         };
-        // What the step promises would not be worth the pass that tells.
-        if promise <= tolerance * lit(0.1) * best.equations.cost {
+        let model = retract(&best.model, &step);
+        // What the step promises is not worth the pass that tells.
+        if promise <= tolerance * best.equations.cost {
+            best.model = model;
             break;
         }
-        let model = retract(&best.model, &step);
         let equations = normal_equations(&model);
         best.passes += 1;
         let (old, new) = (best.equations.cost, equations.cost);

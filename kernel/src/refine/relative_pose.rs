@@ -7,7 +7,7 @@ use super::lm::{EpipolarModel, Manifold, NormalEquations, Row};
 use crate::Real;
 use crate::geometry::Pose;
 use crate::geometry::pose::{from_parts, tangent_basis};
-use crate::linalg::{LANES, product};
+use crate::linalg::product;
 use crate::real::sqrt;
 
 /// A rotation, a unit translation, and the scales between normalised coordinates and the blocks' coordinates.
@@ -179,14 +179,10 @@ impl<T: Real> EpipolarModel<T, 5> for PoseModel<T> {
         PoseFrame { axes, views: Frame { view1, view2 }, parallel_sq: self.scales.parallel_sq }
     }
 
-    #[cfg_attr(not(small), inline(always))]
-    fn inside<B: EpipolarBlock<T>>(frame: &PoseFrame<T>, block: &B, limit: T) -> [bool; LANES] {
-        let mut inside = [false; LANES];
-        for l in 0..LANES {
-            let sight = block.sight(&frame.views, l);
-            inside[l] = sight.c * sight.c < limit * sight.d && sight.in_front(frame.parallel_sq);
-        }
-        inside
+    #[inline(always)]
+    fn inside<B: EpipolarBlock<T>>(frame: &PoseFrame<T>, block: &B, l: usize, limit: T) -> bool {
+        let sight = block.sight(&frame.views, l);
+        sight.c * sight.c < limit * sight.d && sight.in_front(frame.parallel_sq)
     }
 
     /// By a rotation of the frame, and by the translation along its first two axes:

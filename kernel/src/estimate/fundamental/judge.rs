@@ -87,10 +87,10 @@ impl<T: Real> Judge<'_, '_, T> {
         // Where the options promise less noise than there is, the data are believed.
         let sigma = max(self.sigma, noise);
         let indices = list(mask, order);
-        if few_distinct(data, &mut indices.iter().copied(), 7, sigma, accident) {
+        if few_distinct(data, &mut indices.iter().copied(), 7, sigma, &|| accident) {
             return (FundamentalVerdict::Unobservable(Unobservable::TooFewDistinct), noise);
         }
-        if on_a_line(data, indices, sigma, accident) {
+        if on_a_line(data, indices, sigma, &|| accident) {
             return (FundamentalVerdict::Unobservable(Unobservable::Collinear), noise);
         }
         if let Some(plane) = self.plane(indices, sigma) {

@@ -279,10 +279,10 @@ impl<T: Real> Judge<'_, '_, T> {
         let mispaired = measured_accident(data, accident, |block: &PlaneBlock<T>| {
             transfer_sq(&model.0, block, &[scale; LANES])
         });
-        if few_distinct(data, &mut indices.iter().copied(), 4, sigma, mispaired) {
+        if few_distinct(data, &mut indices.iter().copied(), 4, sigma, &|| mispaired) {
             return (HomographyVerdict::Unobservable(Unobservable::TooFewDistinct), noise);
         }
-        if on_a_line(data, indices, sigma, accident) {
+        if on_a_line(data, indices, sigma, &|| accident) {
             return (HomographyVerdict::Unobservable(Unobservable::Collinear), noise);
         }
         let Some(homography) = self.frame.homography(&model.0) else {

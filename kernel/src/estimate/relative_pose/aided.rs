@@ -29,8 +29,8 @@ use crate::solvers::{relpose_upright_3pt, translation_2pt};
 
 /// Blocks of the correspondences on which hypotheses are polished.
 const SUBSET: usize = 8;
-/// Passes over the data in a local optimisation.
-const LOCAL_PASSES: u32 = 4;
+/// Steps of a local optimisation.
+const LOCAL_STEPS: u32 = 2;
 /// The wide threshold is the narrow one and so many standard deviations of the prior.
 const WIDE_SIGMAS: f64 = 1.0;
 /// Where wrong correspondences lie within the wide threshold more often than this, the prior is too vague to sample by.
@@ -181,8 +181,9 @@ impl<T: Real, B: EpipolarBlock<T>, K: Minimal<T, S>, const S: usize> Estimator<T
         if self.problem.within(data, model, wide) < support.to_u32() {
             return None;
         }
-        let model = self.problem.approach(data, model, wide, 1, self.support, residuals)?;
-        self.problem.approach(data, &model, wide * T::HALF, 1, 5, residuals)
+        let [first, second] = [wide, wide * T::HALF].map(Loss::Truncated);
+        let model = self.problem.approach(data, model, &first, 1, self.support, residuals)?;
+        self.problem.approach(data, &model, &second, 1, 5, residuals)
     }
 
     fn score(&self, model: &PoseModel<T>, gate: &Gate<T>, counts: &mut ScoreCounts) -> Option<Score<T>> {
@@ -191,15 +192,13 @@ impl<T: Real, B: EpipolarBlock<T>, K: Minimal<T, S>, const S: usize> Estimator<T
 
     fn repeats(&self, sample: &[u32; S], best: &PoseModel<T>) -> bool {
         // What a sample of inliers leads to is the optimum among them.
-        sample.iter().all(|&index| self.problem.explains(best, index))
+        self.problem.explains(best, sample)
     }
 
     fn refine(&self, model: &PoseModel<T>, residuals: &mut u64) -> Option<PoseModel<T>> {
         // A polished model needs no wide stage.
         let loss = Loss::Tukey(self.problem.threshold * T::TWO);
-        let minimum = self.problem.optimise(model, &loss, LOCAL_PASSES, lit(1e-2));
-        *residuals += minimum.passes as u64 * self.problem.data.count as u64;
-        Some(minimum.model)
+        self.problem.approach(self.problem.data, model, &loss, LOCAL_STEPS, 5, residuals)
     }
 }
 

@@ -28,6 +28,7 @@ fn inverse<T: Real, const P: usize>(a: &SMatrix<T, P, P>, variance: T) -> Option
 /// Sums over residuals within the support of Tukey's loss: of `r psi`, of `psi^2` and of `psi'`, in units of the support.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PsiSums<T> {
+    weights: T,
     r_psi: T,
     psi_sq: T,
     slope: T,
@@ -37,7 +38,14 @@ pub(super) struct PsiSums<T> {
 
 impl<T: Real> Default for PsiSums<T> {
     fn default() -> Self {
-        Self { r_psi: T::ZERO, psi_sq: T::ZERO, slope: T::ZERO, slope_sq: T::ZERO, count: 0 }
+        Self {
+            weights: T::ZERO,
+            r_psi: T::ZERO,
+            psi_sq: T::ZERO,
+            slope: T::ZERO,
+            slope_sq: T::ZERO,
+            count: 0,
+        }
     }
 }
 
@@ -46,8 +54,10 @@ impl<T: Real> Default for PsiSums<T> {
 pub(super) struct Spread<T> {
     /// Standard deviation of a residual.
     pub(super) noise: T,
-    /// The factor of `(J' J)^-1` in the covariance.
+    /// The factor of `(J' W J)^-1` in the covariance.
     pub(super) variance: T,
+    /// By how much Newton's step is longer than that of the weights, which fall with the residual.
+    pub(super) bend: T,
     /// Residuals within the support.
     pub(super) count: u32,
 }
@@ -58,6 +68,7 @@ impl<T: Real> PsiSums<T> {
         if u < T::ONE {
             let w = T::ONE - u;
             let psi_over_r = w * w;
+            self.weights += psi_over_r;
             self.r_psi += u * psi_over_r;
             self.psi_sq += u * psi_over_r * psi_over_r;
             let slope = w * (T::ONE - u * lit(5.0));
@@ -68,7 +79,8 @@ impl<T: Real> PsiSums<T> {
     }
 
     /// The noise by Stein's identity `E[r psi] = sigma^2 E[psi']`, which holds for Gaussian residuals whatever the loss
-    /// cuts off, and the M-estimator's variance `E[psi^2] / E[psi']^2`; `freedom` parameters were fitted.
+    /// cuts off, and the M-estimator's variance `E[psi^2] / E[psi']^2`, times the mean weight; `freedom` parameters were
+    /// fitted.
     ///
     /// # References
     /// P. Huber, "Robust Statistics", 1981, section 7.6; C. Stein, "Estimation of the mean of a multivariate normal
@@ -79,7 +91,7 @@ impl<T: Real> PsiSums<T> {
         // Residuals spread over the whole support leave no slope: then nothing better than the support is known.
         let slope = max(self.slope, n * lit(0.05));
         if self.count == 0 {
-            return Spread { noise: T::ZERO, variance: T::ZERO, count: 0 };
+            return Spread { noise: T::ZERO, variance: T::ZERO, bend: T::ONE, count: 0 };
         }
         let scale = support * support * fitted;
         // Huber's correction for few residuals: 1 + p / n var(psi') / E[psi']^2.
@@ -87,12 +99,13 @@ impl<T: Real> PsiSums<T> {
         let correction = T::ONE + from_u32::<T>(freedom) / n * spread;
         Spread {
             noise: sqrt(self.r_psi / slope * scale),
-            variance: self.psi_sq * n / (slope * slope)
+            count: self.count,
+            bend: self.weights / slope,
+            variance: self.psi_sq * self.weights / (slope * slope)
                 * scale
                 * correction
                 * correction
                 * student(self.count.saturating_sub(freedom)),
-            count: self.count,
         }
     }
 }

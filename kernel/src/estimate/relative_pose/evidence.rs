@@ -65,8 +65,6 @@ pub(super) struct Evidence<'a, 'b, T: Real, B> {
     pub(super) epipolar: Matrix3<T>,
     /// Standard deviation of a coordinate in the blocks' unit.
     pub(super) sigma: T,
-    /// The chance of a wrong correspondence to lie within the threshold of its epipolar line.
-    pub(super) accident: T,
 }
 
 impl<T: Real, B: EpipolarBlock<T>> Evidence<'_, '_, T, B> {
@@ -96,12 +94,14 @@ impl<T: Real, B: EpipolarBlock<T>> Evidence<'_, '_, T, B> {
         result
     }
 
-    /// True where the data prove parallax against a simpler model with `parameters` degrees of freedom.
+    /// True where the data prove parallax against a simpler model with `parameters` degrees of freedom; `accident` is the
+    /// chance of a wrong correspondence to lie within the threshold of its epipolar line.
     pub(super) fn proves_parallax(
         &self,
         count: u32,
         explained: &Explained<T>,
         parameters: u32,
+        accident: T,
         accidents: T,
     ) -> bool {
         let n = explained.all;
@@ -116,7 +116,7 @@ impl<T: Real, B: EpipolarBlock<T>> Evidence<'_, '_, T, B> {
         let deviations =
             if along > across { ln(along / across) * sqrt(from_u32(n)) * T::HALF } else { T::ZERO };
         let unexplained = count.saturating_sub(n);
-        beyond_chance_with(unexplained, explained.others, 2, self.accident, deviations, accidents)
+        beyond_chance_with(unexplained, explained.others, 2, accident, deviations, accidents)
     }
 
     /// True where the epipolar lines of `pose` fit what the plane `x2 ~ H x1` explains far better than the plane's own

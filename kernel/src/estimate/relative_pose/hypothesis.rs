@@ -50,9 +50,11 @@ pub(super) const SAMPLED_BLOCKS: usize = 64;
 const TURNED_BLOCKS: usize = 8;
 /// Passes over those at the most.
 const TURN_PASSES: u64 = TURN_SIGMAS.len() as u64 + 1;
-/// Errors, in standard deviations, up to which correspondences take part in the next rotation: from coarse to fine, so that
-/// a few wrong ones do not hold the rest.
-const TURN_SIGMAS: [u32; 6] = [64, 24, 12, 8, 5, 5];
+/// Errors, in standard deviations, up to which correspondences take part in a rotation: from coarse to fine, so that a few
+/// wrong ones do not hold the rest.
+const TURN_SIGMAS: [u32; 5] = [64, 24, 12, 8, 5];
+/// The same for more correspondences, once that rotation is known.
+const FINE_SIGMAS: [u32; 2] = [8, 5];
 /// Rays closer to parallel than this many thresholds say nothing about depth.
 const PARALLEL: f64 = 1.0;
 
@@ -131,16 +133,31 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
     }
 
     /// The rotation that explains the inliers of a pose best, by alternating between the closest rotation of all that are
-    /// explained and the choice of those, on so many of the `blocks`; none where they leave one open, or where less than half
-    /// of them turn.
+    /// explained and the choice of those, on a few blocks and then on so many; none where they leave one open, or where less
+    /// than half of them turn.
     pub(super) fn rotation(&self, pose: &PoseModel<T>, sigma: T, blocks: usize) -> Option<RotationModel<T>> {
-        let mut model = RotationModel { rotation: pose.rotation, scales: pose.scales };
-        let (s1, s2) = (pose.scales.inverse1(), pose.scales.inverse2());
-        let mut limit: T = T::MAX;
-        let sample = self.agreeing(pose, blocks);
-        for factor in TURN_SIGMAS {
+        let start = RotationModel { rotation: pose.rotation, scales: pose.scales };
+        let turned = self.nearest(&start, &self.agreeing(pose, TURNED_BLOCKS), &TURN_SIGMAS, sigma)?;
+        if blocks <= TURNED_BLOCKS {
+            return Some(turned);
+        }
+        self.nearest(&turned, &self.agreeing(pose, blocks), &FINE_SIGMAS, sigma)
+    }
+
+    /// A rotation near `start` that a sample's correspondences leave after so many choices of them; none as above.
+    fn nearest(
+        &self,
+        start: &RotationModel<T>,
+        sample: &Agreeing,
+        sigmas: &[u32],
+        sigma: T,
+    ) -> Option<RotationModel<T>> {
+        let mut model = *start;
+        let (s1, s2) = (model.scales.inverse1(), model.scales.inverse2());
+        for &factor in sigmas {
+            let limit = from_u32::<T>(factor) * sigma;
             let mut moment = Matrix3::zeros();
-            let turned = self.turned(&sample, &model, limit, |block, turned| {
+            let turned = self.turned(sample, &model, limit * limit, |block, turned| {
                 let (f1, f2) = block.directions();
                 for l in 0..LANES {
                     if turned[l] {
@@ -154,8 +171,6 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
                 return None;
             }
             model.rotation = nearest_rotation(&moment)?;
-            let factor: T = from_u32(factor);
-            limit = factor * factor * sigma * sigma;
         }
         Some(model)
     }
@@ -216,12 +231,16 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         self.turned(&sample, &rotation, limit, |_, _| ()) * 10 >= sample.count * 9
     }
 
-    /// Whether a correspondence is an inlier of a model.
-    pub(super) fn explains(&self, model: &PoseModel<T>, index: u32) -> bool {
-        let Some(block) = self.data.blocks.get(index as usize / LANES) else { return false };
+    /// Whether correspondences are inliers of a model.
+    pub(super) fn explains(&self, model: &PoseModel<T>, sample: &[u32]) -> bool {
         let frame = model.frame();
-        let sight = block.sight(&frame.views, index as usize % LANES);
-        sight.c * sight.c < self.threshold * self.threshold * sight.d && sight.in_front(frame.parallel_sq)
+        sample.iter().all(|&index| {
+            self.data.blocks.get(index as usize / LANES).is_some_and(|block| {
+                let sight = block.sight(&frame.views, index as usize % LANES);
+                sight.c * sight.c < self.threshold * self.threshold * sight.d
+                    && sight.in_front(frame.parallel_sq)
+            })
+        })
     }
 
     /// How many correspondences of whole blocks lie within a threshold of a model, in front of the cameras or not.
@@ -237,13 +256,13 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         count
     }
 
-    /// At most `steps` Gauss-Newton steps towards the minimum of the errors truncated at `threshold`, on some of the blocks,
-    /// without a look at where the last one leads; none where fewer than `least` are active or a direction is open.
+    /// At most `steps` Gauss-Newton steps towards the minimum of a loss, on some of the blocks, without a look at where the
+    /// last one leads; none where fewer than `least` are active or a direction is open.
     pub(super) fn approach(
         &self,
         data: BlockSlice<'_, B>,
         model: &PoseModel<T>,
-        threshold: T,
+        loss: &Loss<T>,
         steps: u32,
         least: u32,
         residuals: &mut u64,
@@ -251,7 +270,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         let every = data.blocks.len().div_ceil(SAMPLED_BLOCKS);
         let mut model = *model;
         for _ in 0..steps {
-            let mut sums = sampled_equations(data, every, &model, &Loss::Truncated(threshold));
+            let mut sums = sampled_equations(data, every, &model, loss);
             *residuals += (data.count / core::cmp::max(every, 1)) as u64;
             if sums.active < least {
                 return None;
@@ -369,9 +388,9 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
 
     fn refine(&self, model: &PoseModel<T>, residuals: &mut u64) -> Option<PoseModel<T>> {
         // A minimal model is off by more than the noise: inliers are gathered from three times the threshold first.
-        let wide = self.threshold * lit(WIDE);
-        let near = self.approach(self.data, model, wide, WIDE_STEPS, 5, residuals)?;
-        self.approach(self.data, &near, self.threshold, LOCAL_STEPS, 5, residuals)
+        let (wide, narrow) = (self.threshold * lit(WIDE), self.threshold);
+        let near = self.approach(self.data, model, &Loss::Truncated(wide), WIDE_STEPS, 5, residuals)?;
+        self.approach(self.data, &near, &Loss::Truncated(narrow), LOCAL_STEPS, 5, residuals)
     }
 
     fn settles(&self, model: &PoseModel<T>, residuals: &mut u64) -> bool {

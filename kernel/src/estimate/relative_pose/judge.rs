@@ -1,5 +1,7 @@
 //! From a consensus to a verdict: the simplest model that the data leave standing.
 
+use core::cell::Cell;
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::super::chance::{EXPLAINED_SIGMAS, beyond_chance, line_accident};
@@ -17,7 +19,7 @@ use crate::linalg::LANES;
 use crate::real::{from_u32, lit, max, min, sqrt};
 use crate::refine::blocks::EpipolarBlock;
 use crate::refine::homography::{RotationModel, transfer_sq};
-use crate::refine::lm::{Manifold, normal_equations};
+use crate::refine::lm::{Manifold, Minimum, NormalEquations};
 use crate::refine::relative_pose::PoseModel;
 use crate::robust::budget::after;
 use crate::robust::loss::Loss;
@@ -36,6 +38,15 @@ pub(super) struct Judge<'a, 'b, T: Real, B> {
     /// Displacement in the blocks' unit up to which a correspondence may stand still.
     pub(super) least_motion: T,
     pub(super) seed: u64,
+}
+
+/// A pose at the minimum of its loss.
+pub(super) struct Refined<T: Real> {
+    pub(super) model: PoseModel<T>,
+    /// The sums of the last pass.
+    equations: NormalEquations<T, 5>,
+    /// Where the loss ends.
+    support: T,
 }
 
 /// What a search has left to spend.
@@ -85,6 +96,8 @@ const MORE_SAMPLES: u32 = 300;
 /// With how many others each correspondence is mispaired to measure what chance explains: at first, and where the verdict
 /// hangs on it.
 const MISPAIRED: usize = 3;
+/// What chance explains may be so much before it is measured.
+const LARGE_ACCIDENT: f64 = 0.3;
 const MISPAIRED_MORE: usize = 24;
 /// Of a scene that stands still at the most one inlier in as many moves by twice the least motion.
 const MOVED_ONE_IN: u32 = 10;
@@ -122,7 +135,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     /// The verdict where no hypothesis was found at all.
     fn without_model(&self, estimate: &mut RelativePoseEstimate<T>) {
         let mut all = 0..self.problem.data.count as u32;
-        estimate.verdict = if few_distinct(self.problem.data, &mut all, 5, self.sigma, self.accident()) {
+        estimate.verdict = if few_distinct(self.problem.data, &mut all, 5, self.sigma, &|| self.accident()) {
             RelativePoseVerdict::Unobservable(Unobservable::TooFewDistinct)
         } else {
             RelativePoseVerdict::NoConsensus
@@ -141,16 +154,24 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         let problem = self.problem;
         let count = problem.data.count as u32;
         let mut refined = self.refine(best, REFINE_PASSES);
-        let mut accident = problem.accident(&refined, self.accident(), MISPAIRED);
         let (inliers, mut spread) = self.mark(&refined, mask);
-        if !beyond_chance(count, inliers, 5, accident) {
-            accident = problem.accident(&refined, self.accident(), MISPAIRED_MORE);
+        // Measured where it is needed only: most poses are beyond the chance that may be.
+        let measured = Cell::new(None);
+        let accident = || {
+            let measure = || problem.accident(&refined.model, self.accident(), MISPAIRED);
+            let accident = measured.get().unwrap_or_else(measure);
+            measured.set(Some(accident));
+            accident
+        };
+        let proven = |accident: T| beyond_chance(count, inliers, 5, accident);
+        if !proven(max(self.accident(), lit(LARGE_ACCIDENT))) && !proven(accident()) {
+            measured.set(Some(problem.accident(&refined.model, self.accident(), MISPAIRED_MORE)));
         }
-        if !beyond_chance(count, inliers, 5, accident) {
+        if measured.get().is_some_and(|accident| !proven(accident)) {
             // Of points on one line even wrong pairs may agree.
             let indices = list(mask, order);
-            let line =
-                indices.len() > LEAST_LINE && on_a_line(problem.data, indices, self.sigma, self.accident());
+            let line = indices.len() > LEAST_LINE
+                && on_a_line(problem.data, indices, self.sigma, &|| self.accident());
             if line {
                 estimate.verdict = RelativePoseVerdict::Unobservable(Unobservable::Collinear);
             } else if !beyond_chance(count, count, 5, self.accident()) {
@@ -165,29 +186,29 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         // Where the options promise less noise than there is, the data are believed.
         let sigma = max(self.sigma, spread.noise);
         let indices = list(mask, order);
-        if few_distinct(problem.data, &mut indices.iter().copied(), 5, sigma, accident) {
+        if few_distinct(problem.data, &mut indices.iter().copied(), 5, sigma, &accident) {
             estimate.verdict = RelativePoseVerdict::Unobservable(Unobservable::TooFewDistinct);
             return;
         }
-        if on_a_line(problem.data, indices, sigma, accident) {
+        if on_a_line(problem.data, indices, sigma, &accident) {
             estimate.verdict = RelativePoseVerdict::Unobservable(Unobservable::Collinear);
             return;
         }
-        let evidence = Evidence { problem, inliers: mask, epipolar: refined.matrix(), sigma, accident };
+        let evidence = Evidence { problem, inliers: mask, epipolar: refined.model.matrix(), sigma };
         if self.hardly_moves(&evidence) {
             let still = RotationModel { rotation: Matrix3::identity(), scales: problem.scales };
             return self.turned(&still, true, self.least_motion / lit(EXPLAINED_SIGMAS), mask, estimate);
         }
-        if let Some(rotation) = problem.rotation(&refined, sigma, SAMPLED_BLOCKS) {
+        if let Some(rotation) = problem.rotation(&refined.model, sigma, SAMPLED_BLOCKS) {
             let explained = evidence.explained(&rotation.matrix());
-            if !evidence.proves_parallax(count, &explained, 3, lit(ROTATION_ACCIDENTS)) {
+            if !evidence.proves_parallax(count, &explained, 3, accident(), lit(ROTATION_ACCIDENTS)) {
                 let still = self.stands_still(&evidence, &rotation, &explained);
                 return self.turned(&rotation, still, sigma, mask, estimate);
             }
         }
         // Where most correspondences agree, the pose and its plane are known well after few passes.
         let clear = 2 * inliers > count;
-        if let Some(mut plane) = self.plane(&refined, indices, sigma, clear) {
+        if let Some(mut plane) = self.plane(&refined.model, indices, sigma, clear) {
             let held = evidence.explained(&plane.0).inliers;
             let planar = 20 * held > inliers * LEAST_SHARE_OF_20;
             if planar && clear {
@@ -196,31 +217,35 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
             if 2 * held > inliers {
                 // A plane that holds most inliers may have led to the wrong one of its two poses.
                 let twins = self.twins(&plane);
-                let mut least = self.cost(&refined);
+                let mut least = self.cost(&refined.model);
                 let leads_back = |twin: &PoseModel<T>| {
-                    let turn = (twin.rotation - refined.rotation).norm_squared() * T::HALF;
-                    turn + (twin.translation - refined.translation).norm_squared() < lit(SAME_POSE_SQ)
+                    let pose = &refined.model;
+                    let turn = (twin.rotation - pose.rotation).norm_squared() * T::HALF;
+                    turn + (twin.translation - pose.translation).norm_squared() < lit(SAME_POSE_SQ)
                 };
                 let mut better = None;
                 let hides = 20 * held > inliers * MORE_SHARE_OF_20;
                 if hides && let Some(other) = self.another(left, &mut estimate.report) {
-                    let cost = self.cost(&other);
+                    let cost = self.cost(&other.model);
                     if cost < least {
                         (better, least) = (Some(other), cost);
                     }
                 }
                 for twin in &twins {
-                    let twin = pose_model(&twin.pose, problem);
                     // Nor is one worth it that half of the inliers speak against.
-                    let far = self.cost(&twin) > least + from_u32::<T>(inliers) * T::HALF;
+                    let far = twin.cost > least + from_u32::<T>(inliers) * T::HALF;
+                    let twin = pose_model(&twin.pose, problem);
                     if clear && (far || leads_back(&twin)) {
                         continue;
                     }
                     // Few passes tell whether it comes near the pose.
-                    let near = self.refine(&twin, TWIN_PASSES);
+                    let near = self.refine(&twin, TWIN_PASSES).model;
+                    if clear && leads_back(&near) {
+                        continue;
+                    }
                     if self.cost(&near) < least + T::ONE {
                         let other = self.refine(&near, REFINE_PASSES);
-                        let cost = self.cost(&other);
+                        let cost = self.cost(&other.model);
                         if cost < least {
                             (better, least) = (Some(other), cost);
                         }
@@ -233,32 +258,34 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                 if planar && let Some(twin) = twins.first() {
                     // The plane's own lines: those of the pose are the ones that the noise happens to lie along.
                     let epipolar = pose_model(&twin.pose, problem).matrix();
-                    let accident = problem.accident(&refined, self.accident(), MISPAIRED_MORE);
-                    let evidence = Evidence { problem, inliers: mask, epipolar, sigma, accident };
+                    let evidence = Evidence { problem, inliers: mask, epipolar, sigma };
                     let explained = evidence.explained(&plane.0);
                     let share =
                         explained.inliers * 20 >= (explained.inliers + explained.others) * PLANE_SHARE_OF_20;
-                    let bends =
-                        evidence.bends(&plane.0, &refined.matrix(), max(spread.noise, sigma * T::HALF));
-                    if share
-                        && !bends
-                        && !evidence.proves_parallax(count, &explained, 8, lit(PLANE_ACCIDENTS))
-                    {
+                    let bends = || {
+                        let noise = max(spread.noise, sigma * T::HALF);
+                        evidence.bends(&plane.0, &refined.model.matrix(), noise)
+                    };
+                    let parallax = || {
+                        let accident = problem.accident(&refined.model, self.accident(), MISPAIRED_MORE);
+                        evidence.proves_parallax(count, &explained, 8, accident, lit(PLANE_ACCIDENTS))
+                    };
+                    if share && !bends() && !parallax() {
                         return self.planar(&plane, &twins, sigma, mask, estimate);
                     }
                 }
             }
         }
-        let (motion, noise, fit) = self.motion(&refined, &spread);
+        let (motion, fit) = self.motion(&refined, &spread);
         estimate.verdict = RelativePoseVerdict::General(motion);
-        estimate.noise_px = noise;
+        estimate.noise_px = spread.noise;
         estimate.prior = fit;
     }
 
     /// The refined best of some more samples, where the search ended by itself and the budget is not spent; adds what they
     /// spend. Not inlined: its variables take no stack elsewhere.
     #[inline(never)]
-    fn another(&self, left: &mut Left<'_>, report: &mut RansacReport<T>) -> Option<PoseModel<T>> {
+    fn another(&self, left: &mut Left<'_>, report: &mut RansacReport<T>) -> Option<Refined<T>> {
         if report.stop != StopReason::Confident {
             return None;
         }
@@ -280,43 +307,47 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     }
 
     /// The pose that all inliers support, with what lies just beyond the threshold at a falling weight.
-    pub(super) fn refine(&self, model: &PoseModel<T>, passes: u32) -> PoseModel<T> {
-        let loss = Loss::Tukey(self.support(&self.spread(model)));
+    pub(super) fn refine(&self, model: &PoseModel<T>, passes: u32) -> Refined<T> {
+        let support = self.support(&self.spread(model));
         // The last step is worth a hundredth of a correspondence.
         let tolerance = max(lit::<T>(1e-2) / from_u32(self.problem.data.count as u32), lit(1e-5));
-        self.problem.optimise(model, &loss, passes, tolerance).model
+        let Minimum { model, equations, .. } =
+            self.problem.optimise(model, &Loss::Tukey(support), passes, tolerance);
+        Refined { model, equations, support }
     }
 
     /// A pose refined from a caller's; none where too few agree with it to fix it. Writes the inlier mask.
     pub(super) fn refined(&self, pose: &Pose<T>, mask: &mut [bool]) -> Option<GeneralMotion<T>> {
         let mut start = pose_model(pose, self.problem);
         let length = sqrt(start.translation.norm_squared());
-        let refined = (length > T::ZERO).then(|| {
+        if length > T::ZERO {
             start.translation *= T::ONE / length;
-            self.refine(&start, REFINE_PASSES)
-        });
-        let marked = refined.map(|model| (model, self.mark(&model, mask)));
-        let Some((model, (6.., spread))) = marked else {
-            mask.iter_mut().for_each(|inlier| *inlier = false);
-            return None;
-        };
-        let motion = self.motion(&model, &spread).0;
-        motion.covariance.map(|_| motion)
+            let refined = self.refine(&start, REFINE_PASSES);
+            let (inliers, spread) = self.mark(&refined, mask);
+            if inliers >= 6 {
+                let motion = self.motion(&refined, &spread).0;
+                return motion.covariance.map(|_| motion);
+            }
+        }
+        mask.iter_mut().for_each(|inlier| *inlier = false);
+        None
     }
 
-    /// A refined pose with its covariance, the noise more precisely, and how a prior that took part agrees.
-    fn motion(&self, model: &PoseModel<T>, seen: &Spread<T>) -> (GeneralMotion<T>, T, Option<PriorFit<T>>) {
-        let support = self.support(seen);
-        let spread = self.sums(model, support).spread(support, 5);
-        let loss = Loss::Truncated(support);
-        let mut sums = normal_equations(self.problem.data, model, &loss);
+    /// A refined pose with its covariance, and how a prior that took part agrees.
+    fn motion(&self, refined: &Refined<T>, spread: &Spread<T>) -> (GeneralMotion<T>, Option<PriorFit<T>>) {
+        let (model, mut sums) = (&refined.model, refined.equations);
         let mut fit = None;
-        if let Some((known, _)) = &self.problem.prior {
+        if let Some((known, variance)) = &self.problem.prior {
+            // What the correspondences say alone, by a Newton step.
+            known.add(&mut sums, &model.rotation, -*variance);
+            let gradient = sums.gradient;
+            sums.gradient *= spread.bend;
             fit = known.agreement(&sums, &model.rotation, spread.variance);
+            sums.gradient = gradient;
             known.add(&mut sums, &model.rotation, spread.variance);
         }
         let covariance = covariance(&sums, spread.variance);
-        (GeneralMotion { pose: model.pose(), covariance }, spread.noise, fit)
+        (GeneralMotion { pose: model.pose(), covariance }, fit)
     }
 
     /// Where the loss about a pose ends: as far as the noise of these correspondences reaches.
@@ -330,20 +361,12 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     }
 
     /// The noise about a pose, from what lies within two thresholds, and how many do.
-    pub(super) fn spread(&self, model: &PoseModel<T>) -> Spread<T> {
-        let support = self.problem.threshold * T::TWO;
-        self.sums(model, support).spread(support, 5)
-    }
-
-    /// What the residuals about a pose say about the noise, by a loss that ends at `support`.
-    fn sums(&self, model: &PoseModel<T>, support: T) -> PsiSums<T> {
+    fn spread(&self, model: &PoseModel<T>) -> Spread<T> {
         let mut sums = PsiSums::default();
-        let share = self.problem.threshold / support;
-        let scale = share * share;
         self.problem.for_each_block(model, |_, squared, filled| {
-            squared.iter().take(filled).for_each(|&s| sums.add(s * scale));
+            squared.iter().take(filled).for_each(|&s| sums.add(s * lit(0.25)));
         });
-        sums
+        sums.spread(self.problem.threshold * T::TWO, 5)
     }
 
     pub(super) fn cost(&self, model: &PoseModel<T>) -> T {
@@ -354,18 +377,20 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         score.map_or(T::MAX, |score| score.cost + prior)
     }
 
-    /// Writes the pose's inliers; how many they are, and the [`spread`](Self::spread).
-    fn mark(&self, model: &PoseModel<T>, mask: &mut [bool]) -> (u32, Spread<T>) {
+    /// Writes the pose's inliers; how many they are, and what the residuals say about the noise.
+    fn mark(&self, refined: &Refined<T>, mask: &mut [bool]) -> (u32, Spread<T>) {
+        let share = self.problem.threshold / refined.support;
+        let scale = share * share;
         let mut entries = mask.iter_mut();
         let (mut inliers, mut sums) = (0, PsiSums::default());
-        self.problem.for_each_block(model, |_, squared, filled| {
+        self.problem.for_each_block(&refined.model, |_, squared, filled| {
             for (inlier, &s) in entries.by_ref().take(filled).zip(squared) {
                 *inlier = s < T::ONE;
                 inliers += *inlier as u32;
-                sums.add(s * lit(0.25));
+                sums.add(s * scale);
             }
         });
-        (inliers, sums.spread(self.problem.threshold * T::TWO, 5))
+        (inliers, sums.spread(refined.support, 5))
     }
 
     /// Writes the inliers of `x2 ~ H x1`.

@@ -124,8 +124,8 @@ pub type RelativePoseError = TwoViewError;
 /// prior as many again, 300 at the most, where a plane holds more than 16 in 20 of those, for there poses that differ
 /// hardly differ in cost; all of them where nothing is found, which by the default takes a third of a second for 200
 /// correspondences on a desktop computer: firmware sets a budget, or [`Guide::keep_going`]. Beyond a budget of
-/// residuals at most one refinement (five passes over 256 correspondences at the most, one score of all, and seven
-/// passes over 32 to try a rotation; with a prior four passes over all), and the verdict's passes. A budget of fewer
+/// residuals at most one refinement (five passes over 256 correspondences at the most, with a prior two, one score of
+/// all, and six passes over 32 to try a rotation), and the verdict's passes. A budget of fewer
 /// than n residuals, of 4 n with a prior, scores nothing. At half outliers a prior takes less than a third of the
 /// samples; a contradicted one costs its own search, of as many samples as a fifth of inliers needs, and one more
 /// verdict.
@@ -326,7 +326,7 @@ fn load<T: Real>(
 /// (100 points, 0.5 px of noise).
 ///
 /// # Cost
-/// At most 14 passes over the correspondences, three times as many with a prior.
+/// At most 12 passes over the correspondences, three times as many with a prior.
 ///
 /// # References
 /// P. Sampson, "Fitting conic sections to very scattered data", 1982; A. Beaton, J. Tukey, "The fitting of power series",

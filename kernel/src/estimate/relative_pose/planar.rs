@@ -28,6 +28,9 @@ const COARSE_PASSES: u32 = 3;
 /// of them 995 in 1,000 are found.
 const ENTRIES: usize = 64;
 const PLANES: u32 = 40;
+/// A plane of three is left where it misses more than this share of the entries looked at and so many more.
+const LEFT: f64 = 0.7;
+const HEAD: f64 = 4.0;
 /// A share of the inliers, as a fraction, below which a plane is none of interest.
 const HELD: [usize; 2] = [2, 5];
 
@@ -60,7 +63,7 @@ pub(super) struct Twin<T: Real> {
     /// |t| over the plane's distance.
     ratio: T,
     /// Cost of the pose over all correspondences.
-    cost: T,
+    pub(super) cost: T,
 }
 
 impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
@@ -77,13 +80,13 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         let mut h = pose.rotation;
         add_outer(&mut h, &pose.translation, &plane, T::ONE);
         let h = pose.scales.transfer(&h);
-        let (passes, tolerance) = if few { (COARSE_PASSES, lit(1e-2)) } else { (PLANE_PASSES, lit(1e-6)) };
+        let (passes, tolerance) = if few { (COARSE_PASSES, lit(1e-2)) } else { (PLANE_PASSES, lit(1e-4)) };
         Some(self.refined_plane(&HomographyModel::new(&h)?, sigma, passes, tolerance))
     }
 
     /// A plane at its optimum.
     pub(super) fn finer(&self, plane: &HomographyModel<T>, sigma: T) -> HomographyModel<T> {
-        self.refined_plane(plane, sigma, PLANE_PASSES, lit(1e-6))
+        self.refined_plane(plane, sigma, PLANE_PASSES, lit(1e-4))
     }
 
     fn refined_plane(
@@ -127,12 +130,14 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
             let normals = [b.ray.cross(&c.ray), c.ray.cross(&a.ray), a.ray.cross(&b.ray)];
             let plane = times(&Matrix3::from_columns(&normals), &Vector3::new(a.value, b.value, c.value));
             let plane = plane * (T::ONE / normals[0].dot(&a.ray));
-            let mut cost = T::ZERO;
+            let (mut cost, mut allowed) = (T::ZERO, lit::<T>(HEAD));
             for entry in entries {
                 let share = entry.squared(&plane) * scale;
                 cost += if share < T::ONE { share } else { T::ONE };
-                // No longer the best.
-                if !(cost < best.0) {
+                // No longer the best, or of no interest.
+                allowed += lit(LEFT);
+                if !(cost < best.0 && cost < allowed) {
+                    cost = T::MAX;
                     break;
                 }
             }
