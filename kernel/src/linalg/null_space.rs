@@ -105,13 +105,13 @@ fn reflect<T: Real, const M: usize, const N: usize, const K: usize, const REFINE
         let v_kk = head - alpha;
         a[k][k] = v_kk;
         scale[k] = T::ONE / (alpha * v_kk);
-        for r in k + 1..M {
-            // v' a_r = (what is left of row k)' a_r - alpha a_kr
-            dot[r] = (dot[r] - alpha * a[k][r]) * scale[k];
+        for r in 0..M {
+            // v' a_r = (what is left of row k)' a_r - alpha a_kr; no step for the rows before, by a loop that knows its length.
+            dot[r] = if r > k { (dot[r] - alpha * a[k][r]) * scale[k] } else { T::ZERO };
         }
         for c in k..N {
             let v = a[c][k];
-            for r in k + 1..M {
+            for r in 0..M {
                 a[c][r] += v * dot[r];
             }
         }

@@ -63,11 +63,13 @@ impl<T: Real, const N: usize> RowQr<T, N> {
     #[inline]
     pub fn fold<const B: usize>(&mut self, mut rows: [[T; N]; B]) {
         for k in 0..N {
-            // Products of column k of the block with itself and with the columns after it, in one pass.
+            // Products of column k of the block with itself and with the columns after it, in one pass. Here and below all
+            // columns are worked on, whatever k, by zeros where nothing is to be done: a loop whose length is known is
+            // short code, and vectors that begin where others began need not wait for two stores.
             let mut dot = [T::ZERO; N];
             for row in &rows {
                 let v = row[k];
-                for j in k..N {
+                for j in 0..N {
                     dot[j] += v * row[j];
                 }
             }
@@ -83,13 +85,13 @@ impl<T: Real, const N: usize> RowQr<T, N> {
             let v0 = head - alpha;
             let scale = T::ONE / (alpha * v0);
             self.r[k][k] = alpha;
-            for j in k + 1..N {
-                dot[j] = (dot[j] + v0 * self.r[k][j]) * scale;
+            for j in 0..N {
+                dot[j] = if j > k { (dot[j] + v0 * self.r[k][j]) * scale } else { T::ZERO };
                 self.r[k][j] += v0 * dot[j];
             }
             for row in &mut rows {
                 let v = row[k];
-                for j in k + 1..N {
+                for j in 0..N {
                     row[j] += v * dot[j];
                 }
             }
