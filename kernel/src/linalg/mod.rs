@@ -9,6 +9,7 @@ pub(crate) mod batch;
 pub(crate) mod conic;
 mod cubic;
 mod eigen;
+mod elimination;
 mod lanes;
 mod ldlt;
 mod least_singular3;
@@ -21,6 +22,7 @@ mod svd3;
 
 pub use cubic::{cubic_roots, quadratic_roots};
 pub use eigen::{SymmetricEigen, symmetric_eigen};
+pub(crate) use elimination::Elimination;
 pub use lanes::{LANES, Lanes};
 pub use ldlt::Ldlt;
 pub(crate) use least_singular3::least_singular3;
