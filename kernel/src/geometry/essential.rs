@@ -7,7 +7,7 @@ use super::pose::{from_parts, rotation_matrix, skew};
 use super::{Fundamental, Pose};
 use crate::Real;
 use crate::linalg::least_singular3;
-use crate::real::{abs, is_finite, lit, max, sqrt, with_sign_of};
+use crate::real::{abs, is_finite, lit, max, sqrt};
 
 /// An essential matrix, known up to scale and sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -129,25 +129,28 @@ impl<T: Real> Essential<T> {
     /// A few `EPSILON` radians, `f32` and `f64`.
     ///
     /// # Cost
-    /// Three square roots and divisions, about 200 other floating-point operations, no branch.
+    /// Four square roots, three divisions, about 180 other floating-point operations.
     #[inline]
     #[must_use]
     pub fn twisted_pair(&self) -> Option<TwistedPair<T>> {
         let m = in_range(&self.0)?;
         let [a, b, c] = m.data.0.map(Vector3::from);
-        // The cofactors of E are s1 s2 u3 v3': with the signs that let them add up, no column need be the largest.
+        // The cofactors of E are s1 s2 u3 v3', their columns along u3.
         let cofactors = [b.cross(&c), c.cross(&a), a.cross(&b)];
-        let add = |u: &Vector3<T>, v: &Vector3<T>| u + v * with_sign_of(T::ONE, u.dot(v));
-        let u = add(&add(&cofactors[0], &cofactors[1]), &cofactors[2]);
+        let squares = cofactors.map(|c| c.norm_squared());
+        let (mut u, mut u_sq) = (cofactors[0], squares[0]);
+        for (column, square) in [(cofactors[1], squares[1]), (cofactors[2], squares[2])] {
+            let larger = square > u_sq;
+            u = Vector3::from_fn(|i, _| if larger { column[i] } else { u[i] });
+            u_sq = if larger { square } else { u_sq };
+        }
         let v = Vector3::new(cofactors[0].dot(&u), cofactors[1].dot(&u), cofactors[2].dot(&u));
-        let (u_sq, v_sq) = (u.norm_squared(), v.norm_squared());
+        let v_sq = v.norm_squared();
         // Divisions that do not wait for a root: 1 / sqrt x = sqrt x / x.
-        let v_norm = sqrt(v_sq);
-        let (u_inverse, v_inverse) = (sqrt(u_sq) * (T::ONE / u_sq), v_norm * (T::ONE / v_sq));
-        let (u3, v3) = (u * u_inverse, v * v_inverse);
-        // (s1 + s2)^2 = s1^2 + s2^2 + 2 s1 s2, and the cofactors map u3 to s1 s2 v3.
+        let (u3, v3) = (u * (sqrt(u_sq) * (T::ONE / u_sq)), v * (sqrt(v_sq) * (T::ONE / v_sq)));
+        // (s1 + s2)^2 = s1^2 + s2^2 + 2 s1 s2
         let size = m.norm_squared();
-        let sum_sq = size + T::TWO * (v_norm * u_inverse);
+        let sum_sq = size + T::TWO * sqrt(squares[0] + squares[1] + squares[2]);
         let scale = sqrt(sum_sq) * (T::ONE / sum_sq);
         // -[u3]x E - E [v3]x = (s1 + s2) (u1 v2' - u2 v1'), whatever s1 and s2.
         let turn = Matrix3::from_columns(&[
