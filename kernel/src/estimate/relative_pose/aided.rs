@@ -30,7 +30,7 @@ use crate::solvers::{relpose_upright_3pt, translation_2pt};
 /// Blocks of the correspondences on which hypotheses are polished.
 const SUBSET: usize = 8;
 /// Steps of a local optimisation.
-const LOCAL_STEPS: u32 = 2;
+const LOCAL_STEPS: u32 = 1;
 /// The wide threshold is the narrow one and so many standard deviations of the prior.
 const WIDE_SIGMAS: f64 = 1.0;
 /// Where wrong correspondences lie within the wide threshold more often than this, the prior is too vague to sample by.

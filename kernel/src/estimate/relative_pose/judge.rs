@@ -310,7 +310,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     pub(super) fn refine(&self, model: &PoseModel<T>, passes: u32) -> Refined<T> {
         let support = self.support(&self.spread(model));
         // The last step is worth a hundredth of a correspondence.
-        let tolerance = max(lit::<T>(1e-2) / from_u32(self.problem.data.count as u32), lit(1e-5));
+        let tolerance = max(lit::<T>(3e-2) / from_u32(self.problem.data.count as u32), lit(1e-5));
         let Minimum { model, equations, .. } =
             self.problem.optimise(model, &Loss::Tukey(support), passes, tolerance);
         Refined { model, equations, support }

@@ -27,7 +27,7 @@ const COARSE_PASSES: u32 = 3;
 /// Inliers among which a plane is looked for, and planes through three of them that are tried: of a plane that holds half
 /// of them 995 in 1,000 are found.
 const ENTRIES: usize = 64;
-const PLANES: u32 = 40;
+const PLANES: u32 = 24;
 /// A plane of three is left where it misses more than this share of the entries looked at and so many more.
 const LEFT: f64 = 0.7;
 const HEAD: f64 = 4.0;
@@ -80,13 +80,13 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         let mut h = pose.rotation;
         add_outer(&mut h, &pose.translation, &plane, T::ONE);
         let h = pose.scales.transfer(&h);
-        let (passes, tolerance) = if few { (COARSE_PASSES, lit(1e-2)) } else { (PLANE_PASSES, lit(1e-4)) };
+        let (passes, tolerance) = if few { (COARSE_PASSES, lit(1e-2)) } else { (PLANE_PASSES, lit(1e-3)) };
         Some(self.refined_plane(&HomographyModel::new(&h)?, sigma, passes, tolerance))
     }
 
     /// A plane at its optimum.
     pub(super) fn finer(&self, plane: &HomographyModel<T>, sigma: T) -> HomographyModel<T> {
-        self.refined_plane(plane, sigma, PLANE_PASSES, lit(1e-4))
+        self.refined_plane(plane, sigma, PLANE_PASSES, lit(1e-3))
     }
 
     fn refined_plane(
