@@ -127,6 +127,12 @@ pub(crate) struct Sight<T> {
 }
 
 impl<T: Real> Sight<T> {
+    /// Of two points, and `d`.
+    #[inline(always)]
+    fn new(y: [T; 3], x: [T; 3], d: T) -> Self {
+        Self { y, x, c: x[1] * y[0] - x[0] * y[1], d }
+    }
+
     /// Whether the point lies in front of both cameras, or its rays are parallel to within noise, so that its depth says
     /// nothing: `parallel_sq` is the squared sine up to which they are.
     #[inline(always)]
@@ -146,12 +152,8 @@ impl<T: Real> Sight<T> {
 /// A correspondence in a [`Frame`], and how its residual moves.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct InFrame<T> {
-    /// The point of view 1.
-    pub(crate) y: [T; 3],
-    /// The point of view 2.
-    pub(crate) x: [T; 3],
-    /// `c`.
-    pub(crate) c: T,
+    /// Where its points are seen.
+    pub(crate) sight: Sight<T>,
     /// `1 / d`; zero where a point lies on both epipoles, which has no residual and no direction to move.
     pub(crate) inverse: T,
     /// `c / d` times the metric's product with the epipolar line of view 1, as a point of view 1.
@@ -173,13 +175,9 @@ fn inverse_or_zero<T: Real>(d: T) -> T {
     if d >= T::MIN_POSITIVE { T::ONE / d } else { T::ZERO }
 }
 
-/// The points of a lane in a frame, and their epipolar lines in view 1 and view 2.
+/// A lane in a frame, and its epipolar lines in view 1 and view 2.
 #[inline(always)]
-fn plane_lines<T: Real>(
-    block: &PlaneBlock<T>,
-    frame: &Frame<T>,
-    l: usize,
-) -> ([T; 3], [T; 3], [T; 2], [T; 2]) {
+fn plane_sight<T: Real>(block: &PlaneBlock<T>, frame: &Frame<T>, l: usize) -> (Sight<T>, [T; 2], [T; 2]) {
     let (m, n) = (&frame.view1.data.0, &frame.view2.data.0);
     let (x1, y1, x2, y2) = (block[0][l], block[1][l], block[2][l], block[3][l]);
     let y = |i: usize| m[0][i] * x1 + m[1][i] * y1 + m[2][i];
@@ -187,31 +185,31 @@ fn plane_lines<T: Real>(
     let (y, x) = ([y(0), y(1), y(2)], [x(0), x(1), x(2)]);
     let l1 = [m[0][0] * x[1] - m[0][1] * x[0], m[1][0] * x[1] - m[1][1] * x[0]];
     let l2 = [n[1][0] * y[0] - n[0][0] * y[1], n[1][1] * y[0] - n[0][1] * y[1]];
-    (y, x, l1, l2)
+    let d = (l2[0] * l2[0] + l2[1] * l2[1]) + (l1[0] * l1[0] + l1[1] * l1[1]);
+    (Sight::new(y, x, d), l1, l2)
+}
+
+/// `F x1` and the first two entries of `F' x2` of a lane.
+#[inline(always)]
+fn plane_lines<T: Real>(block: &PlaneBlock<T>, f: &Matrix3<T>, l: usize) -> ([T; 3], [T; 2]) {
+    let m = &f.data.0;
+    let (x1, y1, x2, y2) = (block[0][l], block[1][l], block[2][l], block[3][l]);
+    let l2 = |i: usize| m[0][i] * x1 + m[1][i] * y1 + m[2][i];
+    let l1 = |j: usize| m[j][0] * x2 + m[j][1] * y2 + m[j][2];
+    ([l2(0), l2(1), l2(2)], [l1(0), l1(1)])
 }
 
 impl<T: Real> EpipolarBlock<T> for PlaneBlock<T> {
     #[inline(always)]
     fn residual_of(&self, f: &Matrix3<T>, l: usize) -> (T, T) {
-        let m = &f.data.0;
-        let (x1, y1, x2, y2) = (self[0][l], self[1][l], self[2][l], self[3][l]);
-        let a = m[0][0] * x1 + m[1][0] * y1 + m[2][0];
-        let b = m[0][1] * x1 + m[1][1] * y1 + m[2][1];
-        let e = m[0][2] * x1 + m[1][2] * y1 + m[2][2];
-        let p = m[0][0] * x2 + m[0][1] * y2 + m[0][2];
-        let q = m[1][0] * x2 + m[1][1] * y2 + m[1][2];
-        (x2 * a + y2 * b + e, (a * a + b * b) + (p * p + q * q))
+        let ([a, b, e], [p, q]) = plane_lines(self, f, l);
+        (self[2][l] * a + self[3][l] * b + e, (a * a + b * b) + (p * p + q * q))
     }
 
     #[inline(always)]
     fn gradient(&self, f: &Matrix3<T>, l: usize) -> (T, T, [T; 9]) {
-        let m = &f.data.0;
         let (x1, y1, x2, y2) = (self[0][l], self[1][l], self[2][l], self[3][l]);
-        let a = m[0][0] * x1 + m[1][0] * y1 + m[2][0];
-        let b = m[0][1] * x1 + m[1][1] * y1 + m[2][1];
-        let e = m[0][2] * x1 + m[1][2] * y1 + m[2][2];
-        let p = m[0][0] * x2 + m[0][1] * y2 + m[0][2];
-        let q = m[1][0] * x2 + m[1][1] * y2 + m[1][2];
+        let ([a, b, e], [p, q]) = plane_lines(self, f, l);
         let c = x2 * a + y2 * b + e;
         let inverse = inverse_or_zero((a * a + b * b) + (p * p + q * q));
         let k = c * inverse;
@@ -226,22 +224,19 @@ impl<T: Real> EpipolarBlock<T> for PlaneBlock<T> {
 
     #[inline(always)]
     fn sight(&self, frame: &Frame<T>, l: usize) -> Sight<T> {
-        let (y, x, l1, l2) = plane_lines(self, frame, l);
-        let d = (l2[0] * l2[0] + l2[1] * l2[1]) + (l1[0] * l1[0] + l1[1] * l1[1]);
-        Sight { y, x, c: x[1] * y[0] - x[0] * y[1], d }
+        plane_sight(self, frame, l).0
     }
 
     #[inline(always)]
     fn in_frame(&self, frame: &Frame<T>, l: usize) -> InFrame<T> {
         let (m, n) = (&frame.view1.data.0, &frame.view2.data.0);
-        let (y, x, l1, l2) = plane_lines(self, frame, l);
-        let c = x[1] * y[0] - x[0] * y[1];
-        let inverse = inverse_or_zero((l2[0] * l2[0] + l2[1] * l2[1]) + (l1[0] * l1[0] + l1[1] * l1[1]));
-        let k = c * inverse;
+        let (sight, l1, l2) = plane_sight(self, frame, l);
+        let inverse = inverse_or_zero(sight.d);
+        let k = sight.c * inverse;
         let (s, t) = ([k * l1[0], k * l1[1]], [k * l2[0], k * l2[1]]);
         let z = |i: usize| m[0][i] * s[0] + m[1][i] * s[1];
         let a = |i: usize| n[i][0] * t[0] + n[i][1] * t[1];
-        InFrame { y, x, c, inverse, z: [z(0), z(1), z(2)], a: [a(0), a(1), a(2)] }
+        InFrame { sight, inverse, z: [z(0), z(1), z(2)], a: [a(0), a(1), a(2)] }
     }
 
     fn mispaired(&self, other: &Self) -> Self {
@@ -302,19 +297,17 @@ fn turned2<T: Real>(frame: &Frame<T>, v: &[T; 3]) -> [T; 3] {
     [dot(&n[0], v), dot(&n[1], v), dot(&n[2], v)]
 }
 
-/// The bearings of a lane in a frame, and their epipolar lines in view 1 and view 2.
+/// A lane in a frame, and the metrics' products with its epipolar lines in view 1 and view 2.
 #[inline(always)]
-fn bearing_lines<T: Real>(
-    block: &BearingBlock<T>,
-    frame: &Frame<T>,
-    l: usize,
-) -> ([T; 3], [T; 3], [T; 3], [T; 3]) {
+fn bearing_sight<T: Real>(block: &BearingBlock<T>, frame: &Frame<T>, l: usize) -> (Sight<T>, [T; 3], [T; 3]) {
     let (m, n) = (&frame.view1.data.0, &frame.view2.data.0);
     let y = turned1(frame, &[block[0][l], block[1][l], block[2][l]]);
     let x = turned2(frame, &[block[3][l], block[4][l], block[5][l]]);
     let l1 = |j: usize| m[j][0] * x[1] - m[j][1] * x[0];
     let l2 = |i: usize| n[1][i] * y[0] - n[0][i] * y[1];
-    (y, x, [l1(0), l1(1), l1(2)], [l2(0), l2(1), l2(2)])
+    let (l1, l2) = ([l1(0), l1(1), l1(2)], [l2(0), l2(1), l2(2)]);
+    let (n1, n2) = metrics(block, l, &l1, &l2);
+    (Sight::new(y, x, dot(&l2, &n2) + dot(&l1, &n1)), n1, n2)
 }
 
 impl<T: Real> EpipolarBlock<T> for BearingBlock<T> {
@@ -344,20 +337,16 @@ impl<T: Real> EpipolarBlock<T> for BearingBlock<T> {
 
     #[inline(always)]
     fn sight(&self, frame: &Frame<T>, l: usize) -> Sight<T> {
-        let (y, x, l1, l2) = bearing_lines(self, frame, l);
-        let (n1, n2) = metrics(self, l, &l1, &l2);
-        Sight { y, x, c: x[1] * y[0] - x[0] * y[1], d: dot(&l2, &n2) + dot(&l1, &n1) }
+        bearing_sight(self, frame, l).0
     }
 
     #[inline(always)]
     fn in_frame(&self, frame: &Frame<T>, l: usize) -> InFrame<T> {
-        let (y, x, l1, l2) = bearing_lines(self, frame, l);
-        let (n1, n2) = metrics(self, l, &l1, &l2);
-        let c = x[1] * y[0] - x[0] * y[1];
-        let inverse = inverse_or_zero(dot(&l2, &n2) + dot(&l1, &n1));
-        let k = c * inverse;
+        let (sight, n1, n2) = bearing_sight(self, frame, l);
+        let inverse = inverse_or_zero(sight.d);
+        let k = sight.c * inverse;
         let (z, a) = (turned1(frame, &n1), turned2(frame, &n2));
-        InFrame { y, x, c, inverse, z: z.map(|z| k * z), a: a.map(|a| k * a) }
+        InFrame { sight, inverse, z: z.map(|z| k * z), a: a.map(|a| k * a) }
     }
 
     fn mispaired(&self, other: &Self) -> Self {

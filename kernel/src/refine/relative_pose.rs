@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, SVector, Vector3};
 
-use super::blocks::{EpipolarBlock, Frame, InFrame};
+use super::blocks::{EpipolarBlock, Frame, InFrame, Sight};
 use super::lm::{EpipolarModel, Manifold, NormalEquations, Row};
 use crate::Real;
 use crate::geometry::Pose;
@@ -189,7 +189,7 @@ impl<T: Real> EpipolarModel<T, 5> for PoseModel<T> {
     /// `sqrt(d) dr = p (dE y) - x (dE z)` with `p = x - a`, where `dE y = e3 x (w x y)` or `e_k x y`.
     #[inline(always)]
     fn row<B: EpipolarBlock<T>>(frame: &PoseFrame<T>, block: &B, l: usize) -> Row<T, 5> {
-        let InFrame { y, x, c, inverse, z, a } = block.in_frame(&frame.views, l);
+        let InFrame { sight: Sight { y, x, c, .. }, inverse, z, a } = block.in_frame(&frame.views, l);
         let p = [x[0] - a[0], x[1] - a[1], x[2] - a[2]];
         let j = [
             p[0] * y[2] - x[0] * z[2],

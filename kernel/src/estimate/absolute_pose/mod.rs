@@ -87,6 +87,7 @@ const NEEDED: usize = 4;
 /// assert!(!workspace.inliers()[0] && workspace.inliers()[1]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+// Inlined, as the next: the options' constants and the camera's type then reach it.
 #[inline(always)]
 pub fn absolute_pose<T: Real>(
     camera: &impl CameraModel<T>,
@@ -120,6 +121,7 @@ pub fn absolute_pose<T: Real>(
 /// # Examples
 /// See [`relative_pose_guided`](super::relative_pose_guided) and [`homography_guided`](super::homography_guided), which
 /// take a guide alike.
+// Inlined: of options without a prior and cameras that are never a fisheye the compiler then drops what serves them.
 #[inline(always)]
 pub fn absolute_pose_guided<T: Real>(
     camera: &impl CameraModel<T>,

@@ -180,6 +180,7 @@ pub type RelativePoseError = TwoViewError;
 /// assert!(matches!(unaided.prior, Some(PriorFit::Contradicted(_))));
 /// assert_eq!(unaided.verdict, estimate.verdict);
 /// ```
+// Inlined, as the next: the options' constants and the camera's type then reach it.
 #[inline(always)]
 pub fn relative_pose<T: Real>(
     camera1: &impl CameraModel<T>,
@@ -232,6 +233,7 @@ pub fn relative_pose<T: Real>(
 /// assert_eq!((estimate.report.spent.iterations, estimate.pose()), (24, None));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+// Inlined: of options without a prior and cameras that are never a fisheye the compiler then drops what serves them.
 #[inline(always)]
 pub fn relative_pose_guided<T: Real>(
     camera1: &impl CameraModel<T>,
