@@ -76,9 +76,11 @@ impl<T: Real, const P: usize> NormalEquations<T, P> {
             let diagonal = damped.data.0[p][p];
             damped.data.0[p][p] = diagonal + damping * diagonal;
         }
-        let mut step = Ldlt::new(&damped)?.solve(&self.gradient);
+        // Not moved out of the option: factors are large.
+        let factors = Ldlt::new(&damped);
+        let mut step = factors.as_ref()?.solve(&self.gradient);
         let mut promise = T::ZERO;
-        for (x, g) in step.iter_mut().zip(&self.gradient) {
+        for (x, g) in step.data.0[0].iter_mut().zip(&self.gradient.data.0[0]) {
             promise += *x * *g;
             *x = -*x;
         }

@@ -354,7 +354,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     fn support(&self, seen: &Spread<T>) -> T {
         let threshold = self.problem.threshold;
         let few = from_u32::<T>(FEW) / from_u32(core::cmp::max(seen.count, FEW));
-        let [near, far]: [T; 2] = SUPPORT_SIGMAS.map(lit);
+        let [near, far]: [T; 2] = [lit(SUPPORT_SIGMAS[0]), lit(SUPPORT_SIGMAS[1])];
         let sigmas = near + (far - near) * few;
         let [least, largest] = [threshold * lit(SUPPORT[0]), threshold * lit(SUPPORT[1])];
         min(max(seen.noise * sigmas, least), largest)
