@@ -105,10 +105,11 @@ const FORBIDDEN_METHODS: &[&str] = &[
     "expect_err",
 ];
 
-/// Integers and `core::cmp` have exact functions of these names, `linalg` and `geometry::pose` bounded ones.
+/// Integers and `core::cmp` have exact functions of these names, `linalg` and `geometry::pose` bounded ones, `real::single` its
+/// own.
 const EXACT_OWNERS: &[&str] = &[
-    "linalg", "pose", "real", "libm", "cmp", "u8", "u16", "u32", "u64", "u128", "usize", "i8", "i16", "i32",
-    "i64", "i128", "isize", "Ord",
+    "linalg", "pose", "real", "single", "libm", "cmp", "u8", "u16", "u32", "u64", "u128", "usize", "i8",
+    "i16", "i32", "i64", "i128", "isize", "Ord",
 ];
 
 const FORBIDDEN_MACROS: &[&str] =

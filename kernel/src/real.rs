@@ -4,14 +4,15 @@
 //! This is the only file that calls `libm` and `epipole-sqrt`. `RealField` has methods of the same names (`sqrt`,
 //! `sin`, `max`, ...); the kernel does not use them, because what they call depends on the target and on features.
 
+mod single;
+
 use nalgebra::RealField;
 
 mod sealed {
     /// Elementary functions, reached through the free functions of the parent module.
     pub trait Sealed: Sized {
         fn raw_sqrt(self) -> Self;
-        fn raw_sin(self) -> Self;
-        fn raw_cos(self) -> Self;
+        fn raw_sin_cos(self) -> (Self, Self);
         fn raw_atan2(self, x: Self) -> Self;
         fn raw_ln(self) -> Self;
         fn raw_exp(self) -> Self;
@@ -50,19 +51,15 @@ pub trait Real: RealField + Copy + sealed::Sealed {
 }
 
 macro_rules! impl_real {
-    ($t:ident, $sqrt:path, $sin:path, $cos:path, $atan2:path, $ln:path, $exp:path, $cbrt:path) => {
+    ($t:ident, $sqrt:path, $sin_cos:path, $atan2:path, $ln:path, $exp:path, $cbrt:path) => {
         impl sealed::Sealed for $t {
             #[inline(always)]
             fn raw_sqrt(self) -> Self {
                 $sqrt(self)
             }
             #[inline]
-            fn raw_sin(self) -> Self {
-                $sin(self)
-            }
-            #[inline]
-            fn raw_cos(self) -> Self {
-                $cos(self)
+            fn raw_sin_cos(self) -> (Self, Self) {
+                $sin_cos(self)
             }
             #[inline]
             fn raw_atan2(self, x: Self) -> Self {
@@ -123,17 +120,8 @@ macro_rules! impl_real {
     };
 }
 
-impl_real!(
-    f32,
-    epipole_sqrt::sqrt_f32,
-    libm::sinf,
-    libm::cosf,
-    libm::atan2f,
-    libm::logf,
-    libm::expf,
-    libm::cbrtf
-);
-impl_real!(f64, epipole_sqrt::sqrt_f64, libm::sin, libm::cos, libm::atan2, libm::log, libm::exp, libm::cbrt);
+impl_real!(f32, epipole_sqrt::sqrt_f32, single::sin_cos, libm::atan2f, libm::logf, libm::expf, single::cbrt);
+impl_real!(f64, epipole_sqrt::sqrt_f64, libm::sincos, libm::atan2, libm::log, libm::exp, libm::cbrt);
 
 /// The nearest value of `T` to a constant. (`T::from_f64` is ambiguous: `RealField` has a method of that name.)
 #[inline(always)]
@@ -151,7 +139,7 @@ pub fn sqrt<T: Real>(x: T) -> T {
 /// `(sin x, cos x)`, `x` in radians.
 #[inline]
 pub fn sin_cos<T: Real>(x: T) -> (T, T) {
-    (x.raw_sin(), x.raw_cos())
+    x.raw_sin_cos()
 }
 
 /// The angle of the point `(x, y)`, in (-pi, pi].
