@@ -107,20 +107,24 @@ impl<T: Real, const P: usize> Sums<T, P> {
     const ZERO: Self =
         Self { hessian: [[[T::ZERO; LANES]; P]; P], gradient: [[T::ZERO; LANES]; P], cost: [T::ZERO; LANES] };
 
-    /// Adds a correspondence to a lane.
+    /// Adds the first `filled` of four correspondences, each to a lane.
     #[cfg_attr(not(small), inline(always))]
     #[cfg_attr(small, inline(never))]
-    fn add_row(&mut self, l: usize, row: &Row<T, P>, loss: &Loss<T>) {
-        let Row { c, inverse, j } = *row;
-        let (cost, weight) = loss.evaluate(c * c * inverse);
-        self.cost[l] += cost;
-        let w = weight * inverse;
-        for p in 0..P {
-            let weighted = w * j[p];
-            self.gradient[p][l] += weighted * c;
-            for q in 0..P {
-                if q <= p {
-                    self.hessian[p][q][l] += weighted * j[q];
+    fn add_rows(&mut self, rows: &[Row<T, P>; LANES], filled: usize, loss: &Loss<T>) {
+        for l in 0..LANES {
+            if l < filled {
+                let Row { c, inverse, j } = rows[l];
+                let (cost, weight) = loss.evaluate(c * c * inverse);
+                self.cost[l] += cost;
+                let w = weight * inverse;
+                for p in 0..P {
+                    let weighted = w * j[p];
+                    self.gradient[p][l] += weighted * c;
+                    for q in 0..P {
+                        if q <= p {
+                            self.hessian[p][q][l] += weighted * j[q];
+                        }
+                    }
                 }
             }
         }
@@ -254,9 +258,7 @@ impl<T: Real, const P: usize> Sums<T, P> {
             left = left.saturating_sub(step.saturating_mul(LANES));
             active += found as u32;
             if found == LANES {
-                for l in 0..LANES {
-                    self.add_row(l, &rows[l], loss);
-                }
+                self.add_rows(&rows, LANES, loss);
                 continue;
             }
             for row in rows.iter().take(found) {
@@ -266,17 +268,11 @@ impl<T: Real, const P: usize> Sums<T, P> {
                 filled += 1;
                 if filled == LANES {
                     filled = 0;
-                    for l in 0..LANES {
-                        self.add_row(l, &pending[l], loss);
-                    }
+                    self.add_rows(&pending, LANES, loss);
                 }
             }
         }
-        for l in 0..LANES {
-            if l < filled {
-                self.add_row(l, &pending[l], loss);
-            }
-        }
+        self.add_rows(&pending, filled, loss);
         (active, seen)
     }
 }
