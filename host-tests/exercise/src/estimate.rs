@@ -71,6 +71,10 @@ fn take<T: Real>(estimate: &RelativePoseEstimate<T>, sink: &mut Sink) {
         }
         _ => sink.count(3),
     }
+    if let Some(motion) = &estimate.general {
+        sink.finite_pose(&motion.pose);
+        sink.finite(motion.covariance.iter().flatten());
+    }
     sink.flag(estimate.pose().is_some());
     sink.finite(&[estimate.noise_px]);
     sink.count(estimate.report.inliers as usize);

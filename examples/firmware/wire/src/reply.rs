@@ -75,7 +75,7 @@ pub enum Reply<'a> {
 #[must_use]
 pub const fn reply_bytes(correspondences: usize) -> usize {
     const HEAD: usize = 1 + 4 + 2 + 4 + 1 + 4 * 4 + 2 * 8;
-    const PLANAR: usize = 2 * (28 + 12 + 4 + 1 + 64 * 4);
+    const PLANAR: usize = 1 + 2 * (28 + 12 + 4 + 1 + 64 * 4) + 1 + 28 + 1 + 25 * 4;
     OVERHEAD + 2 * HEAD + PLANAR + correspondences.div_ceil(8)
 }
 
@@ -108,6 +108,11 @@ pub fn relative_pose_reply(
                     body.f32s(planar.normal.iter());
                     body.f32(planar.baseline_over_distance);
                     write_covariance(body, &planar.covariance);
+                }
+                body.u8(estimate.general.is_some() as u8);
+                if let Some(motion) = &estimate.general {
+                    write_pose(body, &motion.pose);
+                    write_covariance(body, &motion.covariance);
                 }
             }
             RelativePoseVerdict::PureRotation(turn) => {
@@ -183,11 +188,9 @@ impl<'a> Reply<'a> {
 fn relative<'a>(body: &mut Reader<'a>) -> Option<Answer<'a, RelativePoseEstimate<f32>>> {
     let (order, elapsed_us, noise_px, report) = read_head(body)?;
     let prior = read_fit(body)?;
+    let mut general = None;
     let verdict = match body.u8()? {
-        0 => {
-            let pose = read_pose(body)?;
-            RelativePoseVerdict::General(GeneralMotion { pose, covariance: read_covariance(body)? })
-        }
+        0 => RelativePoseVerdict::General(read_motion(body)?),
         1 => {
             let mut poses = Solutions::new();
             for _ in 0..body.u8().filter(|&count| count <= 2)? {
@@ -197,6 +200,9 @@ fn relative<'a>(body: &mut Reader<'a>) -> Option<Answer<'a, RelativePoseEstimate
                     baseline_over_distance: body.f32()?,
                     covariance: read_covariance(body)?,
                 });
+            }
+            if body.u8()? == 1 {
+                general = Some(read_motion(body)?);
             }
             RelativePoseVerdict::Planar(poses)
         }
@@ -211,8 +217,12 @@ fn relative<'a>(body: &mut Reader<'a>) -> Option<Answer<'a, RelativePoseEstimate
         7 => RelativePoseVerdict::NoConsensus,
         _ => return None,
     };
-    let estimate = RelativePoseEstimate { verdict, prior, noise_px, report };
+    let estimate = RelativePoseEstimate { verdict, general, prior, noise_px, report };
     Some(Answer { order, elapsed_us, estimate, inliers: read_mask(body)? })
+}
+
+fn read_motion(body: &mut Reader<'_>) -> Option<GeneralMotion<f32>> {
+    Some(GeneralMotion { pose: read_pose(body)?, covariance: read_covariance(body)? })
 }
 
 fn absolute<'a>(body: &mut Reader<'a>) -> Option<Answer<'a, AbsolutePoseEstimate<f32>>> {

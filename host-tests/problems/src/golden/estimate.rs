@@ -58,6 +58,10 @@ fn verdict<T: Real>(estimate: &RelativePoseEstimate<T>, sink: &mut Sink) {
         }
         _ => sink.count(9),
     }
+    if let Some(motion) = &estimate.general {
+        sink.finite_pose(&motion.pose);
+        sink.finite(motion.covariance.iter().flatten());
+    }
     sink.finite(&[estimate.noise_px]);
     sink.count(estimate.report.inliers as usize);
     sink.count(estimate.report.spent.iterations as usize);

@@ -78,6 +78,10 @@ pub enum Unobservable {
 pub struct RelativePoseEstimate<T: Real> {
     /// The verdict.
     pub verdict: RelativePoseVerdict<T>,
+    /// Of a planar scene: the general motion that explains correspondences off the plane or relief on it, more than both
+    /// poses of the plane do by what three correspondences are worth, although by no more than chance might. Right where
+    /// the scene is but nearly a plane, as most scenes are. None otherwise.
+    pub general: Option<GeneralMotion<T>>,
     /// Of a prior: whether it fits; none without one, or where the verdict knows of no rotation.
     pub prior: Option<PriorFit<T>>,
     /// Robust estimate of the noise of one image coordinate from the inliers' residuals, pixels; 0 without inliers.
@@ -87,12 +91,16 @@ pub struct RelativePoseEstimate<T: Real> {
 }
 
 impl<T: Real> RelativePoseEstimate<T> {
-    /// The pose of a general motion, or the more likely one of a planar scene.
+    /// The pose of a general motion; of a planar scene that of [`general`](Self::general), else the plane's more likely
+    /// one.
     #[must_use]
     pub fn pose(&self) -> Option<Pose<T>> {
         match &self.verdict {
             RelativePoseVerdict::General(motion) => Some(motion.pose),
-            RelativePoseVerdict::Planar(poses) => poses.first().map(|planar| planar.pose),
+            RelativePoseVerdict::Planar(poses) => {
+                let planar = poses.first().map(|planar| planar.pose);
+                self.general.map(|motion| motion.pose).or(planar)
+            }
             _ => None,
         }
     }
