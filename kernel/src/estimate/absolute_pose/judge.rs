@@ -111,7 +111,7 @@ fn judged<T: Real, B: ReprojectionBlock<T>>(
     // A pose where Tukey's loss is least, which no single correspondence at the threshold moves; its inliers' equations.
     let refined = |model: &CameraPose<T>, passes: u32| {
         let wide = Loss::Tukey(problem.threshold * T::TWO);
-        let model = problem.optimise(model, &wide, gravity, passes, lit(1e-6)).model;
+        let model = problem.optimise(model, &wide, gravity, passes, lit(1e-4)).model;
         problem.optimise(&model, &Loss::Truncated(problem.threshold), gravity, 1, T::ZERO)
     };
     let best = refined(&model, 12);
