@@ -315,7 +315,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     /// The pose that all inliers support, with what lies just beyond the threshold at a falling weight.
     pub(super) fn refine(&self, model: &PoseModel<T>, passes: u32) -> Refined<T> {
         let support = self.support(&self.spread(model));
-        // The last step is worth a hundredth of a correspondence.
+        // The last step is worth three hundredths of a correspondence.
         let tolerance = max(lit::<T>(3e-2) / from_u32(self.problem.data.count as u32), lit(1e-5));
         let Minimum { model, equations, .. } =
             self.problem.optimise(model, &Loss::Tukey(support), passes, tolerance);

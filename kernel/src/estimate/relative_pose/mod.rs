@@ -124,7 +124,7 @@ pub type RelativePoseError = TwoViewError;
 /// prior as many again, 300 at the most, where a plane holds more than 13 in 20 of those, for there poses that differ
 /// hardly differ in cost; all of them where nothing is found, which by the default takes a third of a second for 200
 /// correspondences on a desktop computer: firmware sets a budget, or [`Guide::keep_going`]. Beyond a budget of
-/// residuals at most one refinement (five passes over 256 correspondences at the most, with a prior two, one score of
+/// residuals at most one refinement (five passes over 256 correspondences at the most, with a prior one, one score of
 /// all, and six passes over 32 to try a rotation), and the verdict's passes. A budget of fewer
 /// than n residuals, of 4 n with a prior, scores nothing. At half outliers a prior takes less than a third of the
 /// samples; a contradicted one costs its own search, of as many samples as a fifth of inliers needs, and one more

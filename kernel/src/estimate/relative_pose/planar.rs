@@ -25,7 +25,7 @@ const PLANE_PASSES: u32 = 12;
 const COARSE_PASSES: u32 = 3;
 
 /// Inliers among which a plane is looked for, and planes through three of them that are tried: of a plane that holds half
-/// of them 995 in 1,000 are found.
+/// of them 24 in 25 are found.
 const ENTRIES: usize = 64;
 const PLANES: u32 = 24;
 /// A plane of three is left where it misses more than this share of the entries looked at and so many more.
