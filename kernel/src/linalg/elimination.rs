@@ -60,7 +60,7 @@ impl<T: Real, const M: usize, const N: usize> Elimination<T, M, N> {
         true
     }
 
-    /// A vector that every row is orthogonal to, of largest element 1 or a little more.
+    /// A vector that every row is orthogonal to: its last place is 1, and none exceeds `2^(M-1)` (of correspondences hardly 3).
     #[inline]
     pub(crate) fn null_vector(&self) -> [T; N] {
         self.back([T::ZERO; M], T::ONE)
@@ -93,5 +93,49 @@ impl<T: Real, const M: usize, const N: usize> Elimination<T, M, N> {
             }
         }
         result
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(rows: [[f64; 4]; 3]) -> Elimination<f64, 3, 4> {
+        let mut result = Elimination::new();
+        result.columns = core::array::from_fn(|j| core::array::from_fn(|i| rows[i][j]));
+        result
+    }
+
+    fn products(rows: &[[f64; 4]; 3], x: &[f64; 4]) -> [f64; 3] {
+        rows.map(|row| row.iter().zip(x).map(|(a, b)| a * b).sum())
+    }
+
+    #[test]
+    fn a_null_vector_and_given_products() {
+        // The largest elements stand in the last and the first column, and zeros where pivots would be without exchange.
+        let rows = [[0.0, 1.0, -2.0, 5.0], [3.0, 0.0, 0.5, 7.0], [9.0, -1.0, 0.0, 2.0]];
+        let mut equations = of(rows);
+        assert!(equations.factor(1e-12));
+        let null = equations.null_vector();
+        assert!(null.contains(&1.0) && null.iter().all(|x| x.abs() <= 4.0));
+        assert!(products(&rows, &null).iter().all(|x| x.abs() < 1e-14), "{null:?}");
+        let wanted = [0.3, -4.0, 2.0];
+        let found = products(&rows, &equations.solve(wanted));
+        assert!(found.iter().zip(&wanted).all(|(a, b)| (a - b).abs() < 1e-14), "{found:?}");
+    }
+
+    #[test]
+    fn no_factors_of_dependent_rows_or_what_is_not_finite() {
+        let rows = [[1.0, 2.0, 3.0, 4.0], [0.0, 1.0, -1.0, 2.0], [2.0, 5.0, 5.0, 10.0]];
+        assert!(!of(rows).factor(1e-14));
+        assert!(!of([[0.0; 4]; 3]).factor(0.0));
+        for bad in [f64::NAN, f64::INFINITY] {
+            for at in 0..12 {
+                let mut rows = [[1.0, 2.0, 3.0, 5.0], [0.0, 1.0, -1.0, 2.0], [2.0, 0.0, 5.0, 1.0]];
+                rows[at / 4][at % 4] = bad;
+                let mut equations = of(rows);
+                assert!(!equations.factor(0.0) || !equations.null_vector().iter().all(|x| x.is_finite()));
+            }
+        }
     }
 }

@@ -173,8 +173,8 @@ fn of_eight<T: Real>(
             column[k] = element;
         }
     }
-    // Rows of equal lengths would be of norm 3/8.
-    if !equations.factor(lit::<T>(4.0) * T::EPSILON) {
+    // Rows of equal lengths would be of norm 3/8; of degenerate points rounding leaves less than this in all but one in 1,000.
+    if !equations.factor(lit::<T>(16.0) * T::EPSILON) {
         return None;
     }
     let f = matrix(&equations.null_vector());
@@ -184,8 +184,9 @@ fn of_eight<T: Real>(
 
 /// `x2' M x1` of each correspondence, to seven binary digits more than a plain sum of products has.
 ///
-/// Each factor is split into its first seven digits, counted from the largest of its kind, and the rest. The products of
-/// the former and their sums have no rounding error, those with a rest are smaller by seven digits.
+/// Each factor is split into its first digits, seven counted from the sum of the sizes of its kind, and the rest. The products
+/// of the former and their sums have no rounding error unless one point is larger than all others together; those with a rest
+/// are smaller by seven digits.
 #[inline]
 fn residuals<T: Real>(m: &Matrix3<T>, x1: &[Vector3<T>; 8], x2: &[Vector3<T>; 8]) -> [T; 8] {
     // A sum with a number so much larger keeps the seven digits.
