@@ -39,9 +39,11 @@ class Report(ctypes.Structure):
 class Estimate(ctypes.Structure):
     _fields_ = [
         ("report", Report), ("verdict", ctypes.c_uint32), ("unobservable", ctypes.c_uint32),
-        ("pose_count", ctypes.c_uint32), ("prior", ctypes.c_uint32), ("covariance_size", ctypes.c_uint32 * 2), ("noise_px", ctypes.c_double), ("prior_deviations", ctypes.c_double),
+        ("pose_count", ctypes.c_uint32), ("prior", ctypes.c_uint32), ("has_general", ctypes.c_uint32),
+        ("covariance_size", ctypes.c_uint32 * 2), ("noise_px", ctypes.c_double), ("prior_deviations", ctypes.c_double),
         ("poses", Pose * 2), ("normals", ctypes.c_double * 6), ("baseline_over_distance", ctypes.c_double * 2),
         ("covariance", ctypes.c_double * 64 * 2),
+        ("general", Pose), ("general_covariance", ctypes.c_double * 25), ("general_has_covariance", ctypes.c_uint32),
     ]
 
 

@@ -646,6 +646,16 @@ typedef struct epi_pose_f32 {
     float translation[3];
 } epi_pose_f32;
 
+// What `epi_refine_relative_pose` found.
+typedef struct epi_refined_relative_pose_f32 {
+    // Of view 2 in the frame of view 1, |t| = 1.
+    struct epi_pose_f32 pose;
+    // 5x5 by rows: w of `R <- Exp(w) R` (rad), then t in its tangent basis; zeros without.
+    float covariance[5][5];
+    // 1 where there is a covariance, 0 where a direction is open.
+    uint32_t has_covariance;
+} epi_refined_relative_pose_f32;
+
 // What `epi_relative_pose` found.
 typedef struct epi_relative_pose_estimate_f32 {
     // How the search went.
@@ -658,6 +668,8 @@ typedef struct epi_relative_pose_estimate_f32 {
     uint32_t pose_count;
     // What became of a prior: one of `epi_prior_fit`.
     uint32_t prior;
+    // Of a plane: 1 where `general` holds a general motion, else 0.
+    uint32_t has_general;
     // Rows of each covariance: 5, 8 or 3 by the verdict, 0 where the inliers leave a direction open.
     uint32_t covariance_size[2];
     // Robust estimate of the noise of one image coordinate, pixels; 0 without inliers.
@@ -672,6 +684,9 @@ typedef struct epi_relative_pose_estimate_f32 {
     float baseline_over_distance[2];
     // By rows, in the first `covariance_size` squared numbers. Order: `kernel/CONVENTIONS.md`.
     float covariance[2][64];
+    // Of a plane: the general motion that explains more correspondences than both poses of the plane, although by no more
+    // than chance might. The better answer where the scene is but nearly a plane.
+    struct epi_refined_relative_pose_f32 general;
 } epi_relative_pose_estimate_f32;
 
 // A robust estimation asks, before every eighth iteration: may I go on? A window before every one. 0 means no.
@@ -811,16 +826,6 @@ typedef struct epi_absolute_pose_estimate_f32 {
     // 6x6 by rows: w of `R <- Exp(w) R` (rad), then t.
     float covariance[2][6][6];
 } epi_absolute_pose_estimate_f32;
-
-// What `epi_refine_relative_pose` found.
-typedef struct epi_refined_relative_pose_f32 {
-    // Of view 2 in the frame of view 1, |t| = 1.
-    struct epi_pose_f32 pose;
-    // 5x5 by rows: w of `R <- Exp(w) R` (rad), then t in its tangent basis; zeros without.
-    float covariance[5][5];
-    // 1 where there is a covariance, 0 where a direction is open.
-    uint32_t has_covariance;
-} epi_refined_relative_pose_f32;
 
 // Options of `epi_refine_absolute_pose`.
 typedef struct epi_refine_absolute_pose_options_f32 {
@@ -1068,6 +1073,16 @@ typedef struct epi_pose_f64 {
     double translation[3];
 } epi_pose_f64;
 
+// What `epi_refine_relative_pose` found.
+typedef struct epi_refined_relative_pose_f64 {
+    // Of view 2 in the frame of view 1, |t| = 1.
+    struct epi_pose_f64 pose;
+    // 5x5 by rows: w of `R <- Exp(w) R` (rad), then t in its tangent basis; zeros without.
+    double covariance[5][5];
+    // 1 where there is a covariance, 0 where a direction is open.
+    uint32_t has_covariance;
+} epi_refined_relative_pose_f64;
+
 // What `epi_relative_pose` found.
 typedef struct epi_relative_pose_estimate_f64 {
     // How the search went.
@@ -1080,6 +1095,8 @@ typedef struct epi_relative_pose_estimate_f64 {
     uint32_t pose_count;
     // What became of a prior: one of `epi_prior_fit`.
     uint32_t prior;
+    // Of a plane: 1 where `general` holds a general motion, else 0.
+    uint32_t has_general;
     // Rows of each covariance: 5, 8 or 3 by the verdict, 0 where the inliers leave a direction open.
     uint32_t covariance_size[2];
     // Robust estimate of the noise of one image coordinate, pixels; 0 without inliers.
@@ -1094,6 +1111,9 @@ typedef struct epi_relative_pose_estimate_f64 {
     double baseline_over_distance[2];
     // By rows, in the first `covariance_size` squared numbers. Order: `kernel/CONVENTIONS.md`.
     double covariance[2][64];
+    // Of a plane: the general motion that explains more correspondences than both poses of the plane, although by no more
+    // than chance might. The better answer where the scene is but nearly a plane.
+    struct epi_refined_relative_pose_f64 general;
 } epi_relative_pose_estimate_f64;
 
 // Options of `epi_homography`.
@@ -1229,16 +1249,6 @@ typedef struct epi_absolute_pose_estimate_f64 {
     // 6x6 by rows: w of `R <- Exp(w) R` (rad), then t.
     double covariance[2][6][6];
 } epi_absolute_pose_estimate_f64;
-
-// What `epi_refine_relative_pose` found.
-typedef struct epi_refined_relative_pose_f64 {
-    // Of view 2 in the frame of view 1, |t| = 1.
-    struct epi_pose_f64 pose;
-    // 5x5 by rows: w of `R <- Exp(w) R` (rad), then t in its tangent basis; zeros without.
-    double covariance[5][5];
-    // 1 where there is a covariance, 0 where a direction is open.
-    uint32_t has_covariance;
-} epi_refined_relative_pose_f64;
 
 // Options of `epi_refine_absolute_pose`.
 typedef struct epi_refine_absolute_pose_options_f64 {

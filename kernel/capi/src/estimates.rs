@@ -22,6 +22,8 @@ pub struct RelativePoseEstimate<T> {
     pub pose_count: u32,
     /// What became of a prior: one of `epi_prior_fit`.
     pub prior: u32,
+    /// Of a plane: 1 where `general` holds a general motion, else 0.
+    pub has_general: u32,
     /// Rows of each covariance: 5, 8 or 3 by the verdict, 0 where the inliers leave a direction open.
     pub covariance_size: [u32; 2],
     /// Robust estimate of the noise of one image coordinate, pixels; 0 without inliers.
@@ -36,6 +38,9 @@ pub struct RelativePoseEstimate<T> {
     pub baseline_over_distance: [T; 2],
     /// By rows, in the first `covariance_size` squared numbers. Order: `kernel/CONVENTIONS.md`.
     pub covariance: [[T; 64]; 2],
+    /// Of a plane: the general motion that explains more correspondences than both poses of the plane, although by no more
+    /// than chance might. The better answer where the scene is but nearly a plane.
+    pub general: RefinedRelativePose<T>,
 }
 
 /// What `epi_refine_relative_pose` found.
@@ -186,6 +191,7 @@ impl<T: Real> RelativePoseEstimate<T> {
             unobservable: enums::Unobservable::No as u32,
             pose_count: 0,
             prior: enums::PriorFit::None as u32,
+            has_general: 0,
             covariance_size: [0; 2],
             noise_px: T::ZERO,
             prior_deviations: T::ZERO,
@@ -193,6 +199,7 @@ impl<T: Real> RelativePoseEstimate<T> {
             normals: [[T::ZERO; 3]; 2],
             baseline_over_distance: [T::ZERO; 2],
             covariance: [[T::ZERO; 64]; 2],
+            general: RefinedRelativePose::zero(),
         }
     }
 }
@@ -239,9 +246,18 @@ impl<T: Real> From<&estimate::RelativePoseEstimate<T>> for RelativePoseEstimate<
             Some(_) => (enums::PriorFit::Other, T::ZERO),
         };
         (found.prior, found.prior_deviations) = (prior as u32, sigmas);
+        if let Some(motion) = &kernel.general {
+            (found.has_general, found.general) = (1, motion.into());
+        }
         found.report = kernel.report.into();
         found.noise_px = kernel.noise_px;
         found
+    }
+}
+
+impl<T: Real> RefinedRelativePose<T> {
+    const fn zero() -> Self {
+        Self { pose: Pose::zero(), covariance: [[T::ZERO; 5]; 5], has_covariance: 0 }
     }
 }
 

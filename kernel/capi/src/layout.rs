@@ -20,7 +20,7 @@ sizes! {
     RefinedTwoView: 52 96;
     SearchReport: 48 56;
     Pose: 28 56;
-    RelativePoseEstimate: 680 1296;
+    RelativePoseEstimate: 816 1568;
     HomographyOptions: 48 56;
     HomographyEstimate: 392 728;
     FundamentalOptions: 48 56;

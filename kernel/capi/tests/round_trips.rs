@@ -486,6 +486,16 @@ macro_rules! round_trips {
                         (want.noise_px, want.report.cost, want.report.spent.iterations)
                     );
                     assert_eq!(mask.to_vec(), flags(w.inliers()));
+                    // Beside a plane.
+                    assert_eq!((e.has_general, want.general), (0, None));
+                    let beside = estimate::RelativePoseEstimate { general: Some(*motion), ..want.clone() };
+                    let c_beside = out::RelativePoseEstimate::from(&beside);
+                    assert_eq!((c_beside.has_general, c_beside.general.has_covariance), (1, 1));
+                    assert_eq!(c_beside.general.pose, pose_of(&motion.pose));
+                    assert_eq!(
+                        c_beside.general.covariance.as_flattened(),
+                        motion.covariance.unwrap().numbers()
+                    );
 
                     let mut wide = WideTwoViewStorage::<S, 60>::new();
                     let mut w = wide.workspace();
