@@ -91,6 +91,22 @@ fn planar_scenes<T: Real>() {
     assert!(share.value() >= 0.85, "{share:?}");
 }
 
+/// An exact plane's motion has hardly ever a general rival, whatever the noise is said to be; where it has one, that is the
+/// estimate's pose.
+fn planes_have_no_rival<T: Real>() {
+    for noise in [0.5, 1.0] {
+        let share = share_of(40, |seed, _| {
+            let problem = noisy(Motion::General, Shape::Plane).noise_px(noise).generate(seed + 9000);
+            let (estimate, _) = estimate_scene::<T>(&problem, &options()).unwrap();
+            let RelativePoseVerdict::Planar(poses) = &estimate.verdict else { return true };
+            let rival = estimate.general.map(|motion| motion.pose);
+            assert_eq!(estimate.pose(), rival.or(poses.first().map(|twin| twin.pose)));
+            rival.is_none()
+        });
+        assert!(share.value() >= 0.9, "{noise}: {share:?}");
+    }
+}
+
 fn bits<T: Real>(estimate: &epipole::estimate::RelativePoseEstimate<T>) -> String {
     // Debug output of floats is exact.
     format!("{estimate:?}")
@@ -288,6 +304,7 @@ both!(
     recovers_general_motion,
     degenerate_scenes,
     planar_scenes,
+    planes_have_no_rival,
     determinism,
     progress_counts_on,
     ranked_sampling,

@@ -93,8 +93,9 @@ const PLANE_ACCIDENTS: f64 = 0.03;
 /// the most, look for a better one.
 const MORE_SHARE_OF_20: u32 = 13;
 const MORE_SAMPLES: u32 = 300;
-/// A pose that explains more correspondences than both poses of a plane do, by as many as this (in cost), is reported beside
-/// them: of exact planes one in ten has one, of real scenes that count as planes four in five.
+/// A pose that explains more correspondences than both poses of a plane do, by as many as this (in cost, where the noise is
+/// what it is said to be), is reported beside them: of exact planes one in thirty has one, of real scenes that count as planes
+/// four in five.
 const RIVAL: f64 = 3.0;
 /// With how many others each correspondence is mispaired to measure what chance explains: at first, and where the verdict
 /// hangs on it.
@@ -274,7 +275,10 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                         evidence.proves_parallax(count, &explained, 8, accident, lit(PLANE_ACCIDENTS))
                     };
                     if share && !bends() && !parallax() {
-                        if twins.iter().all(|twin| least + lit(RIVAL) < twin.cost) {
+                        // What a free pose gains of the noise grows with its square.
+                        let louder = sigma / self.sigma;
+                        let rival = lit::<T>(RIVAL) * louder * louder;
+                        if twins.iter().all(|twin| least + rival < twin.cost) {
                             estimate.general = Some(self.motion(&refined, &spread).0);
                         }
                         return self.planar(&plane, &twins, sigma, mask, estimate);

@@ -79,8 +79,9 @@ pub struct RelativePoseEstimate<T: Real> {
     /// The verdict.
     pub verdict: RelativePoseVerdict<T>,
     /// Of a planar scene: the general motion that explains correspondences off the plane or relief on it, more than both
-    /// poses of the plane do by what three correspondences are worth, although by no more than chance might. Right where
-    /// the scene is but nearly a plane, as most scenes are. None otherwise.
+    /// poses of the plane do by what three correspondences are worth (or more, where the noise is louder than it is said to
+    /// be), although by no more than chance might. Right where the scene is but nearly a plane, as most scenes are. None
+    /// otherwise.
     pub general: Option<GeneralMotion<T>>,
     /// Of a prior: whether it fits; none without one, or where the verdict knows of no rotation.
     pub prior: Option<PriorFit<T>>,
