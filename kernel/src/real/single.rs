@@ -15,7 +15,7 @@ fn series(coefficients: &[f32], x: f32) -> f32 {
     coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c)
 }
 
-/// `(sin x, cos x)`, to three units in the last place for any finite number; NaN for others.
+/// `(sin x, cos x)`, to 3.2 units in the last place for any finite number; NaN for others.
 ///
 /// # References
 /// M. Payne, R. Hanek, "Radian reduction for trigonometric functions", ACM SIGNUM Newsletter, 1983.

@@ -85,7 +85,8 @@ pub fn relpose_8pt<T: Real>(
 /// As [`relpose_8pt`].
 ///
 /// # Accuracy
-/// As [`relpose_8pt`], in whitened coordinates.
+/// As [`relpose_8pt`], in whitened coordinates, for points no farther from the origin than some ten times their spread; beyond
+/// that `f32` loses digits by the square of the ratio.
 ///
 /// # Cost
 /// As [`relpose_8pt`].

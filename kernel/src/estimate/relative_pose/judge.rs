@@ -94,7 +94,7 @@ const PLANE_ACCIDENTS: f64 = 0.03;
 const MORE_SHARE_OF_20: u32 = 13;
 const MORE_SAMPLES: u32 = 300;
 /// A pose that explains more correspondences than both poses of a plane do, by as many as this (in cost, where the noise is
-/// what it is said to be), is reported beside them: of exact planes one in thirty has one, of real scenes that count as planes
+/// what it is said to be), is reported beside them: of exact planes one in forty has one, of real scenes that count as planes
 /// four in five.
 const RIVAL: f64 = 3.0;
 /// With how many others each correspondence is mispaired to measure what chance explains: at first, and where the verdict

@@ -81,7 +81,7 @@ pub struct RelativePoseEstimate<T: Real> {
     /// Of a planar scene: the general motion that explains correspondences off the plane or relief on it, more than both
     /// poses of the plane do by what three correspondences are worth (or more, where the noise is louder than it is said to
     /// be), although by no more than chance might. Right where the scene is but nearly a plane, as most scenes are. None
-    /// otherwise.
+    /// otherwise. The inliers are the plane's.
     pub general: Option<GeneralMotion<T>>,
     /// Of a prior: whether it fits; none without one, or where the verdict knows of no rotation.
     pub prior: Option<PriorFit<T>>,
