@@ -313,7 +313,8 @@ pub(super) fn judge<T: Real, B: EpipolarBlock<T>>(
     }
     estimate.report = total(second.report);
     let budget = left.budget.less(&second.report.spent);
-    plain.judge(&second, &mut Left { budget, keep_going }, mask, order, estimate);
+    let searched = second.report.spent.iterations;
+    plain.judge(&second, &mut Left { searched, budget, keep_going }, mask, order, estimate);
     let fit = known.agreement(&estimate.verdict);
     if let Some(PriorFit::Fits(_)) = fit {
         aided.judge(&second, &mut Left::none(), mask, order, estimate);

@@ -51,6 +51,8 @@ pub(super) struct Refined<T: Real> {
 
 /// What a search has left to spend.
 pub(super) struct Left<'a> {
+    /// Iterations of that search, without others before it.
+    pub(super) searched: u32,
     pub(super) budget: Budget,
     pub(super) keep_going: Option<&'a mut dyn FnMut(&Progress) -> bool>,
 }
@@ -58,7 +60,7 @@ pub(super) struct Left<'a> {
 impl Left<'_> {
     /// Nothing.
     pub(super) fn none() -> Self {
-        Self { budget: Budget { max_iterations: 0, ..Budget::default() }, keep_going: None }
+        Self { searched: 0, budget: Budget { max_iterations: 0, ..Budget::default() }, keep_going: None }
     }
 }
 
@@ -299,7 +301,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         if report.stop != StopReason::Confident {
             return None;
         }
-        let wanted = core::cmp::min(MORE_SAMPLES, report.spent.iterations);
+        let wanted = core::cmp::min(MORE_SAMPLES, left.searched);
         let samples = core::cmp::min(wanted, left.budget.max_iterations);
         let budget = Budget { max_iterations: samples, ..left.budget };
         let options =

@@ -439,7 +439,8 @@ fn estimate<T: Real, B: EpipolarBlock<T>>(
             let consensus = ransac::<T, _, 5>(judge.problem, &options.ransac, ranked, LEAST_INLIERS, ask);
             found.report = consensus.report;
             let budget = options.ransac.budget.less(&consensus.report.spent);
-            judge.judge(&consensus, &mut Left { budget, keep_going }, mask, order, found);
+            let searched = consensus.report.spent.iterations;
+            judge.judge(&consensus, &mut Left { searched, budget, keep_going }, mask, order, found);
         }),
     }
 }
