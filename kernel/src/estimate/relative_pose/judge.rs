@@ -93,7 +93,7 @@ const ROTATION_ACCIDENTS: f64 = 1e-4;
 const PLANE_ACCIDENTS: f64 = 0.03;
 /// Where a plane explains more inliers than this, poses that differ hardly differ in cost: as many samples again, so many at
 /// the most, look for a better one.
-const MORE_SHARE_OF_20: u32 = 13;
+const MORE_SHARE_OF_20: u32 = 16;
 const MORE_SAMPLES: u32 = 300;
 /// A pose that explains more correspondences than both poses of a plane do, by as many as this (in cost, where the noise is
 /// what it is said to be), is reported beside them: of exact planes one in forty has one, of real scenes that count as planes

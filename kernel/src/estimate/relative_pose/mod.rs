@@ -121,7 +121,7 @@ pub type RelativePoseError = TwoViewError;
 ///
 /// # Cost
 /// At most `max_iterations` samples, by itself as many as the confidence needs for the inliers found, and without a
-/// prior as many again, 300 at the most, where a plane holds more than 13 in 20 of those, for there poses that differ
+/// prior as many again, 300 at the most, where a plane holds more than 16 in 20 of those, for there poses that differ
 /// hardly differ in cost; all of them where nothing is found, which by the default takes a third of a second for 200
 /// correspondences on a desktop computer: firmware sets a budget, or [`Guide::keep_going`]. Beyond a budget of
 /// residuals at most one refinement (five passes over 256 correspondences at the most, with a prior one, one score of
