@@ -224,17 +224,17 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                 // A plane that holds most inliers may have led to the wrong one of its two poses.
                 let twins = self.twins(&plane);
                 let mut least = self.cost(&refined.model);
+                let pose = refined.model;
                 let leads_back = |twin: &PoseModel<T>| {
-                    let pose = &refined.model;
                     let turn = (twin.rotation - pose.rotation).norm_squared() * T::HALF;
                     turn + (twin.translation - pose.translation).norm_squared() < lit(SAME_POSE_SQ)
                 };
-                let mut better = None;
+                let mut moved = false;
                 let hides = 20 * held > inliers * MORE_SHARE_OF_20;
                 if hides && let Some(other) = self.another(left, &mut estimate.report) {
                     let cost = self.cost(&other.model);
                     if cost < least {
-                        (better, least) = (Some(other), cost);
+                        (refined, least, moved) = (other, cost, true);
                     }
                 }
                 for twin in &twins {
@@ -253,12 +253,11 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                         let other = self.refine(&near, REFINE_PASSES);
                         let cost = self.cost(&other.model);
                         if cost < least {
-                            (better, least) = (Some(other), cost);
+                            (refined, least, moved) = (other, cost, true);
                         }
                     }
                 }
-                if let Some(better) = better {
-                    refined = better;
+                if moved {
                     spread = self.mark(&refined, mask).1;
                 }
                 if planar && let Some(twin) = twins.first() {
