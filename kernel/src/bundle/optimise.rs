@@ -68,8 +68,8 @@ impl<T: Real> Window<'_, T> {
         self.optimise_while(options, |_| true)
     }
 
-    /// [`optimise`](Self::optimise) as long as `go_on` says yes; it is asked before every iteration, with what has been done so
-    /// far: the place for a timer.
+    /// [`optimise`](Self::optimise) as long as `go_on` says yes; it is asked before every iteration, with what has been
+    /// done so far: the place for a timer.
     ///
     /// # Returns
     /// As [`optimise`](Self::optimise), with [`Termination::Interrupted`](super::Termination::Interrupted) where `go_on` said

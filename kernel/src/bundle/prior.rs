@@ -75,15 +75,18 @@ impl<T: Real> Window<'_, T> {
     /// M. Kaess, A. Ranganathan, F. Dellaert, "iSAM: incremental smoothing and mapping", IEEE Transactions on Robotics
     /// 24(6), 2008 (rows by Givens rotations). N. Demmel, D. Schubert, C. Sommer, D. Cremers, V. Usenko, "Square root
     /// marginalization for sliding-window bundle adjustment", ICCV 2021. Deviations, both measured on a synthetic
-    /// flight of 60 frames, 8 in the window: they drop the frame's observations of points that live on, or end the points, which leaves
+    /// flight of 60 frames, 8 in the window: they drop the frame's observations of points that live on, or end the
+    /// points, which leaves
     /// 2.8 times the position error of full bundle adjustment against 1.1 times. Keeping the prior's first
     /// linearisation point instead of moving it makes the window inconsistent within 2,000 frames (normalised error
     /// squared of 4,500 a degree of freedom after 6,000 frames, against 0.7). Moving it in a chart of each frame by
-    /// itself lets relative measurements pass, to second order, for knowledge of the heading: after 10,000 frames deviations were told a third too small and the error had grown to 8.8 m, against 1.9 m by
-    /// the anchor (`bundle_flight long 10000 7`); the invariance is that of A. Barrau, S. Bonnabel, "The invariant
-    /// extended Kalman filter as a stable observer", IEEE Transactions on Automatic Control 62(4), 2017. Over 300 frames and five other flights the position
-    /// error is 0.98 times that of full bundle adjustment, 0.70 to 2.1 times in one (`bundle_flight 300 5 1 1000` in
-    /// `host-tests`, 2026-11-26); letting a frame from the middle leave by turns made no difference (1.09).
+    /// itself lets relative measurements pass, to second order, for knowledge of the heading: after 10,000 frames
+    /// deviations were told a third too small and the error had grown to 8.8 m, against 1.9 m by the anchor
+    /// (`bundle_flight long 10000 7`); the invariance is that of A. Barrau, S. Bonnabel, "The invariant extended Kalman
+    /// filter as a stable observer", IEEE Transactions on Automatic Control 62(4), 2017. Over 300 frames and five other
+    /// flights the position error is 0.98 times that of full bundle adjustment, 0.70 to 2.1 times in one
+    /// (`bundle_flight 300 5 1 1000` in `host-tests`, 2026-11-26); letting a frame from the middle leave by turns made
+    /// no difference (1.09).
     pub fn marginalise_frame(&mut self, frame: FrameHandle, loss: &Loss<T>) -> Result<usize, WindowError> {
         self.frame(frame)?;
         if !self.has_prior_memory() {

@@ -48,8 +48,8 @@ impl<'a, T: Real> SquareRoot<'a, T> {
         insert(self.factor, self.n, row, scale);
     }
 
-    /// Folds in those observations of a point that enter, given those that stay. Afterwards `lead` holds the rows that determine the point itself: leaving
-    /// them aside marginalises it.
+    /// Folds in those observations of a point that enter, given those that stay. Afterwards `lead` holds the rows that
+    /// determine the point itself: leaving them aside marginalises it.
     pub(super) fn insert_point(
         &mut self,
         frames: &[FrameSlot<T>],

@@ -55,7 +55,8 @@ impl<T: Real> Scatter<T> {
         result
     }
 
-    /// By how much the inverse of `J' W J` is to be multiplied: `E[psi psi'] E[psi']^-2` of the residuals, times the mean weight.
+    /// By how much the inverse of `J' W J` is to be multiplied: `E[psi psi'] E[psi']^-2` of the residuals, times the
+    /// mean weight.
     pub(super) fn factor(&self) -> Option<T> {
         let student: T = student(core::cmp::max(2 * self.count, 10) - 8);
         (self.slopes > T::ZERO)

@@ -83,8 +83,8 @@ impl<T: Real> Essential<T> {
     /// (s1 + s2) / 2, (s1 + s2) / 2, 0.
     ///
     /// # Returns
-    /// `None` where the matrix or the result is not finite, or it has no two singular values above `16 EPSILON` of the largest.
-    /// Where s2 = s3 the nearest matrix is not unique and one of them is returned.
+    /// `None` where the matrix or the result is not finite, or it has no two singular values above `16 EPSILON` of the
+    /// largest. Where s2 = s3 the nearest matrix is not unique and one of them is returned.
     ///
     /// # References
     /// R. Hartley, "Estimation of relative camera positions for uncalibrated cameras", ECCV 1992.

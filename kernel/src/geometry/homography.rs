@@ -20,8 +20,8 @@ pub struct PlaneMotion<T: Real> {
     /// Pose of view 2 in the frame of view 1, its translation in units of the plane's distance from camera 1: `t / d`.
     /// Zero for a pure rotation.
     pub pose: Pose<T>,
-    /// The unit normal of the plane in the frame of view 1, away from the camera where the plane lies in front: `n' X1 = d > 0`.
-    /// The zero vector for a pure rotation, of which no plane is seen.
+    /// The unit normal of the plane in the frame of view 1, away from the camera where the plane lies in front: `n' X1
+    /// = d > 0`. The zero vector for a pure rotation, of which no plane is seen.
     pub normal: Vector3<T>,
 }
 
@@ -126,9 +126,9 @@ impl<T: Real> Homography<T> {
     /// sign.
     ///
     /// # Returns
-    /// Four motions: two twins, each with (t, n) and (-t, -n), one after the other; [`Self::visible_motions`] keeps what the points
-    /// allow. Two where the twins coincide (the translation is along the normal). One, with zero translation and normal,
-    /// where H is a rotation to within `8 EPSILON`. None where H is singular or not finite.
+    /// Four motions: two twins, each with (t, n) and (-t, -n), one after the other; [`Self::visible_motions`] keeps
+    /// what the points allow. Two where the twins coincide (the translation is along the normal). One, with zero
+    /// translation and normal, where H is a rotation to within `8 EPSILON`. None where H is singular or not finite.
     ///
     /// # Accuracy
     /// The rotation to a few `EPSILON` near a pure rotation too; `n` to `EPSILON / |t|`. Where the twins nearly coincide they

@@ -17,8 +17,8 @@ const MAX_STEPS: usize = 40;
 ///
 /// Householder's method of order three from beyond that root, where the cubic is convex: the steps only approach it,
 /// without trigonometry or cube roots. The start is where the parabola that touches the cubic at its extremum has its root,
-/// or above the root of a monotone cubic. The error after a step is of the order of its fourth power; the last step is below
-/// `last_step` of the distance to the inflection.
+/// or above the root of a monotone cubic. The error after a step is of the order of its fourth power; the last step is
+/// below `last_step` of the distance to the inflection.
 ///
 /// Time is a chain of operations that wait for each other, so sums and products are paired to be short rather than few.
 #[inline]

@@ -56,8 +56,8 @@ pub fn quadratic_roots<T: Real>(c: &[T; 3]) -> Solutions<T, 2> {
 /// `c[3]` not much smaller than the others: where it vanishes a root goes to infinity and is lost. Any scale.
 ///
 /// # Returns
-/// One root or three (two where two of them coincide to within rounding); the one farthest from the inflection first. Nothing
-/// where a coefficient is not finite, `c[3]` is zero or their quotients overflow.
+/// One root or three (two where two of them coincide to within rounding); the one farthest from the inflection first.
+/// Nothing where a coefficient is not finite, `c[3]` is zero or their quotients overflow.
 ///
 /// # Accuracy
 /// The residual of each root is a few `EPSILON` times the sum of the sizes of the cubic's terms there.

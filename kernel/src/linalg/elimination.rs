@@ -60,7 +60,8 @@ impl<T: Real, const M: usize, const N: usize> Elimination<T, M, N> {
         true
     }
 
-    /// A vector that every row is orthogonal to: its last place is 1, and none exceeds `2^(M-1)` (of correspondences hardly 3).
+    /// A vector that every row is orthogonal to: its last place is 1, and none exceeds `2^(M-1)` (of correspondences
+    /// hardly 3).
     #[inline]
     pub(crate) fn null_vector(&self) -> [T; N] {
         self.back([T::ZERO; M], T::ONE)

@@ -104,7 +104,8 @@ impl<T: Real, const N: usize> RowQr<T, N> {
     /// where the matrix is nearly rank deficient.
     ///
     /// # Returns
-    /// `None` where `r` is zero, not finite, or so large that its squares are not. Compare `value` and `next_value` to judge the rank.
+    /// `None` where `r` is zero, not finite, or so large that its squares are not. Compare `value` and `next_value` to
+    /// judge the rank.
     ///
     /// # Cost
     /// At most 24 iterations, and one for `next_value`; two triangular solves each.

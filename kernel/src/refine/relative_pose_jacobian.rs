@@ -39,8 +39,8 @@ use crate::{InputError, Real};
 /// Two passes of about 600 operations a correspondence.
 ///
 /// # References
-/// R. M. Haralick, "Propagating covariance in computer vision", ICPR 1994; O. Faugeras, "Three-Dimensional Computer Vision", MIT
-/// Press, 1993, section 5.6 (the theorem); P. Sampson, 1982 (the error).
+/// R. M. Haralick, "Propagating covariance in computer vision", ICPR 1994; O. Faugeras, "Three-Dimensional Computer
+/// Vision", MIT Press, 1993, section 5.6 (the theorem); P. Sampson, 1982 (the error).
 ///
 /// # Examples
 /// ```

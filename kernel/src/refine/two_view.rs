@@ -214,9 +214,9 @@ pub fn relative_pose<T: Real>(
 
 /// The homography of least robust error near a start: `x2 ~ H x1`.
 ///
-/// `min sum rho(2 e' (I + J J')^-1 e)` with the transfer error `e = H x1 - x2` and J the Jacobian of the transferred point: to
-/// first order the squared distance to the nearest pair that H maps onto one another, doubled, so that it is `|e|^2` where
-/// the scale is kept. Eight degrees of freedom.
+/// `min sum rho(2 e' (I + J J')^-1 e)` with the transfer error `e = H x1 - x2` and J the Jacobian of the transferred
+/// point: to first order the squared distance to the nearest pair that H maps onto one another, doubled, so that it is
+/// `|e|^2` where the scale is kept. Eight degrees of freedom.
 ///
 /// # Input
 /// Pixels or other points of two planes, at least four; a regular start.

@@ -34,9 +34,9 @@ pub trait Estimator<T: Real, const S: usize> {
     /// and nothing handed over, where the sample was rejected as degenerate before it was solved.
     fn generate(&self, sample: &[u32; S], found: &mut impl FnMut(&Self::Model)) -> bool;
 
-    /// A hypothesis as it is to be scored; none where it is not worth that: where it is unlikely to cost less than `bound`, which
-    /// is none at first (`T::MAX`). Serves problems whose minimal models are off by more than the noise. Adds the residuals
-    /// evaluated.
+    /// A hypothesis as it is to be scored; none where it is not worth that: where it is unlikely to cost less than
+    /// `bound`, which is none at first (`T::MAX`). Serves problems whose minimal models are off by more than the noise.
+    /// Adds the residuals evaluated.
     fn polish(&self, model: &Self::Model, _bound: T, _counts: &mut ScoreCounts) -> Option<Self::Model> {
         Some(*model)
     }

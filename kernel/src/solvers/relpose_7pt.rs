@@ -20,9 +20,9 @@ use crate::{Real, Solutions};
 /// returned once or twice.
 ///
 /// # Degeneracies
-/// An empty list where the equations are linearly dependent (repeated points, points on one plane, a camera that does not move)
-/// or every member of the pencil is singular, to within rounding; where the points of a view lie on a line; and where a
-/// coordinate is NaN or infinite.
+/// An empty list where the equations are linearly dependent (repeated points, points on one plane, a camera that does
+/// not move) or every member of the pencil is singular, to within rounding; where the points of a view lie on a line;
+/// and where a coordinate is NaN or infinite.
 ///
 /// # Accuracy
 /// The epipolar constraint of the seven points and `det F` to a few `EPSILON`.

@@ -34,7 +34,8 @@ const BLOCK: usize = 10;
 /// rad in the median.
 ///
 /// # Cost
-/// 8 points: elimination and a step of refinement, about 2000 operations in all. N points: 330 N operations and up to 24 inverse iterations, of which 2 to 6 are usual.
+/// 8 points: elimination and a step of refinement, about 2000 operations in all. N points: 330 N operations and up to
+/// 24 inverse iterations, of which 2 to 6 are usual.
 ///
 /// # References
 /// H. C. Longuet-Higgins, "A computer algorithm for reconstructing a scene from two projections", Nature, 1981;
@@ -85,8 +86,8 @@ pub fn relpose_8pt<T: Real>(
 /// As [`relpose_8pt`].
 ///
 /// # Accuracy
-/// As [`relpose_8pt`], in whitened coordinates, for points no farther from the origin than some ten times their spread; beyond
-/// that `f32` loses digits by the square of the ratio.
+/// As [`relpose_8pt`], in whitened coordinates, for points no farther from the origin than some ten times their spread;
+/// beyond that `f32` loses digits by the square of the ratio.
 ///
 /// # Cost
 /// As [`relpose_8pt`].
@@ -174,7 +175,8 @@ fn of_eight<T: Real>(
             column[k] = element;
         }
     }
-    // Rows of equal lengths would be of norm 3/8; of degenerate points rounding leaves less than this in all but one in 1,000.
+    // Rows of equal lengths would be of norm 3/8; of degenerate points rounding leaves less than this in all but one in
+    // 1,000.
     if !equations.factor(lit::<T>(16.0) * T::EPSILON) {
         return None;
     }
@@ -185,9 +187,9 @@ fn of_eight<T: Real>(
 
 /// `x2' M x1` of each correspondence, to seven binary digits more than a plain sum of products has.
 ///
-/// Each factor is split into its first digits, seven counted from the sum of the sizes of its kind, and the rest. The products
-/// of the former and their sums have no rounding error unless one point is larger than all others together; those with a rest
-/// are smaller by seven digits.
+/// Each factor is split into its first digits, seven counted from the sum of the sizes of its kind, and the rest. The
+/// products of the former and their sums have no rounding error unless one point is larger than all others together;
+/// those with a rest are smaller by seven digits.
 #[inline]
 fn residuals<T: Real>(m: &Matrix3<T>, x1: &[Vector3<T>; 8], x2: &[Vector3<T>; 8]) -> [T; 8] {
     // A sum with a number so much larger keeps the seven digits.

@@ -53,8 +53,8 @@ const NEEDED: usize = 4;
 ///
 /// # Cost
 /// Bounded by [`Budget`](crate::robust::Budget). With gravity the search by two correspondences takes as many samples as a
-/// twentieth of inliers needs; where it finds less than 30 %, or a pose that contradicts the prior, one without gravity takes
-/// what is left.
+/// twentieth of inliers needs; where it finds less than 30 %, or a pose that contradicts the prior, one without gravity
+/// takes what is left.
 ///
 /// # References
 /// M. Fischler, R. Bolles, "Random sample consensus", Communications of the ACM, 1981; O. Chum, J. Matas, J. Kittler,

@@ -74,14 +74,16 @@ impl<T: Real> Default for FundamentalOptions<T> {
 /// middle of the points in units of their spread, so that `f32` answers as `f64` does.
 ///
 /// # Cost
-/// At most [`Budget::max_iterations`](crate::robust::Budget) samples of seven, by itself as many as the confidence needs for
-/// the inliers found, and one local optimisation of at most 13 passes over the correspondences for each that leads.
+/// At most [`Budget::max_iterations`](crate::robust::Budget) samples of seven, by itself as many as the confidence
+/// needs for the inliers found, and one local optimisation of at most 13 passes over the correspondences for each that
+/// leads.
 ///
 /// # References
 /// O. Chum, T. Werner, J. Matas, "Two-view geometry estimation unaffected by a dominant plane", CVPR 2005, and
 /// "Epipolar geometry estimation via RANSAC benefits from the oriented epipolar constraint", ICPR 2004;
-/// A. Bartoli, P. Sturm, "Nonlinear estimation of the fundamental matrix with minimal parameters", IEEE Transactions on Pattern Analysis
-/// and Machine Intelligence, 2004 (deviation: tangents of the matrices of rank 2 in place of two rotations).
+/// A. Bartoli, P. Sturm, "Nonlinear estimation of the fundamental matrix with minimal parameters", IEEE Transactions on
+/// Pattern Analysis and Machine Intelligence, 2004 (deviation: tangents of the matrices of rank 2 in place of two
+/// rotations).
 ///
 /// # Examples
 /// ```

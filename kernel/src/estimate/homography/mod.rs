@@ -59,7 +59,8 @@ impl<T: Real> Default for HomographyOptions<T> {
 /// The homography `x2 ~ H x1` of pixel correspondences, many of which may be wrong, or why there is none.
 ///
 /// Minimises over `H` the sum of a robust loss of `e' (I + J J')^-1 e`, with the transfer error
-/// `e = h(x1) - x2` in view 2 and `J` the Jacobian of `h` (Sampson's approximation of the reprojection error in both views).
+/// `e = h(x1) - x2` in view 2 and `J` the Jacobian of `h` (Sampson's approximation of the reprojection error in both
+/// views).
 ///
 /// # Input
 /// Pixels of two images, not corrected for a lens beyond a pinhole: `x1[i]` corresponds to `x2[i]`, at least 4.
@@ -75,16 +76,17 @@ impl<T: Real> Default for HomographyOptions<T> {
 /// [`HomographyVerdict::Unobservable`].
 ///
 /// # Accuracy
-/// That of the maximum-likelihood estimate from the inliers to within a few percent. Coordinates are counted from the middle of
-/// the points in units of their spread, so that `f32` answers as `f64` does.
+/// That of the maximum-likelihood estimate from the inliers to within a few percent. Coordinates are counted from the
+/// middle of the points in units of their spread, so that `f32` answers as `f64` does.
 ///
 /// # Cost
-/// At most [`Budget::max_iterations`](crate::robust::Budget) samples of four, and one local optimisation of at most 10 passes over the
-/// correspondences for each that leads.
+/// At most [`Budget::max_iterations`](crate::robust::Budget) samples of four, and one local optimisation of at most 10
+/// passes over the correspondences for each that leads.
 ///
 /// # References
 /// M. Fischler, R. Bolles, "Random sample consensus", Communications of the ACM, 1981; O. Chum, T. Pajdla, P. Sturm, "The
-/// geometric error for homographies", Computer Vision and Image Understanding, 2005 (the error); P. Huber, "Robust Statistics", 1981, section
+/// geometric error for homographies", Computer Vision and Image Understanding, 2005 (the error); P. Huber, "Robust
+/// Statistics", 1981, section
 /// 6.3 (the covariance of an M-estimate).
 ///
 /// # Examples

@@ -88,16 +88,16 @@ const SAME_POSE_SQ: f64 = 0.0005;
 /// Accidents expected at the most where parallax counts as proven against a rotation: where it is hardly visible a general
 /// pose has no direction, so that little is lost.
 const ROTATION_ACCIDENTS: f64 = 1e-4;
-/// Accidents expected at the most where something off a plane counts as proven: to leave a plane that is one costs less than
-/// to hold one that is none.
+/// Accidents expected at the most where something off a plane counts as proven: to leave a plane that is one costs less
+/// than to hold one that is none.
 const PLANE_ACCIDENTS: f64 = 0.03;
-/// Where a plane explains more inliers than this, poses that differ hardly differ in cost: as many samples again, so many at
-/// the most, look for a better one.
+/// Where a plane explains more inliers than this, poses that differ hardly differ in cost: as many samples again, so
+/// many at the most, look for a better one.
 const MORE_SHARE_OF_20: u32 = 16;
 const MORE_SAMPLES: u32 = 300;
 /// A pose that explains more correspondences than both poses of a plane do, by as many as this (in cost, where the noise is
-/// what it is said to be), is reported beside them: of exact planes one in forty has one, of real scenes that count as planes
-/// four in five.
+/// what it is said to be), is reported beside them: of exact planes one in forty has one, of real scenes that count as
+/// planes four in five.
 const RIVAL: f64 = 3.0;
 /// With how many others each correspondence is mispaired to measure what chance explains: at first, and where the verdict
 /// hangs on it.

@@ -114,10 +114,10 @@ pub type RelativePoseError = TwoViewError;
 /// where the views hardly differ ([`RelativePoseOptions::least_motion_px`]).
 ///
 /// # Accuracy
-/// That of a maximum-likelihood fit to the inliers (Tukey's loss, ending at six standard deviations of the noise found, with
-/// more than 150 inliers at fewer, down to 3.5, and at 0.8 to 2.6 thresholds), in `f32` as in `f64`. The covariances are those of M-estimates with the noise found: over 1,000
-/// scenes of 100 points, with no and with 20 % outliers, the mean normalised squared errors lie within their 95 % bounds, but for
-/// the few poses led astray.
+/// That of a maximum-likelihood fit to the inliers (Tukey's loss, ending at six standard deviations of the noise found,
+/// with more than 150 inliers at fewer, down to 3.5, and at 0.8 to 2.6 thresholds), in `f32` as in `f64`. The
+/// covariances are those of M-estimates with the noise found: over 1,000 scenes of 100 points, with no and with 20 %
+/// outliers, the mean normalised squared errors lie within their 95 % bounds, but for the few poses led astray.
 ///
 /// # Cost
 /// At most `max_iterations` samples, by itself as many as the confidence needs for the inliers found, and without a

@@ -39,9 +39,10 @@ const SAME: f64 = 32.0;
 /// No solution where the five equations are linearly dependent (a repeated pair, for example) or a number is not finite.
 ///
 /// # Accuracy
-/// Noise-free problems of a 1241x376 camera with a rotation error below 1e-6 rad in `f64`: 99.98 to 100 % (5000 each of five kinds of motion), real
-/// roots lost against a solution of 31 digits at most 0.015 %, none spurious or twice. Below 1e-3 rad in `f32`: 99.5 % of random poses, 98.9 %
-/// of small motions (99.9 % of both have a solution at all with the rounded bearings), 94 to 95 % of forward motions.
+/// Noise-free problems of a 1241x376 camera with a rotation error below 1e-6 rad in `f64`: 99.98 to 100 % (5000 each of
+/// five kinds of motion), real roots lost against a solution of 31 digits at most 0.015 %, none spurious or twice.
+/// Below 1e-3 rad in `f32`: 99.5 % of random poses, 98.9 % of small motions (99.9 % of both have a solution at all with
+/// the rounded bearings), 94 to 95 % of forward motions.
 ///
 /// # Cost
 /// No iteration before the roots; then at most 20 Newton steps a root (4 or 5 usual) and 8 a candidate matrix (1 or 2).
@@ -49,8 +50,8 @@ const SAME: f64 = 32.0;
 ///
 /// # References
 /// D. Nistér, "An efficient solution to the five-point relative pose problem", IEEE Transactions on Pattern Analysis
-/// and Machine Intelligence, 2004, for the elimination and the polynomial. Not his: the null space by reflections, orthonormal rows before
-/// the determinant, the roots in Bernstein's basis, the Newton steps on the essential matrices.
+/// and Machine Intelligence, 2004, for the elimination and the polynomial. Not his: the null space by reflections,
+/// orthonormal rows before the determinant, the roots in Bernstein's basis, the Newton steps on the essential matrices.
 ///
 /// # Examples
 /// ```
