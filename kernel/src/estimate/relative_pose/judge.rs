@@ -2,19 +2,19 @@
 
 use core::cell::Cell;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 
 use super::super::chance::{EXPLAINED_SIGMAS, beyond_chance, line_accident};
 use super::super::degenerate::{few_distinct, list, on_a_line};
 use super::super::prior::PriorFit;
 use super::LEAST_INLIERS;
-use super::covariance::{PsiSums, Spread, covariance, variance};
-use super::evidence::{Evidence, Explained};
+use super::covariance::{PsiSums, Spread, covariance};
+use super::evidence::Evidence;
 use super::hypothesis::{PoseProblem, SAMPLED_BLOCKS};
-use super::verdict::{GeneralMotion, PureRotation, RelativePoseEstimate, RelativePoseVerdict, Unobservable};
+use super::verdict::{GeneralMotion, RelativePoseEstimate, RelativePoseVerdict, Unobservable};
 use crate::Real;
 use crate::geometry::Pose;
-use crate::geometry::pose::{from_parts, rotation_matrix};
+use crate::geometry::pose::rotation_matrix;
 use crate::linalg::LANES;
 use crate::real::{from_u32, lit, max, min, sqrt};
 use crate::refine::blocks::EpipolarBlock;
@@ -102,11 +102,9 @@ const RIVAL: f64 = 3.0;
 /// With how many others each correspondence is mispaired to measure what chance explains: at first, and where the verdict
 /// hangs on it.
 const MISPAIRED: usize = 3;
+const MISPAIRED_MORE: usize = 24;
 /// What chance explains may be so much before it is measured.
 const LARGE_ACCIDENT: f64 = 0.3;
-const MISPAIRED_MORE: usize = 24;
-/// Of a scene that stands still at the most one inlier in as many moves by twice the least motion.
-const MOVED_ONE_IN: u32 = 10;
 /// Inliers of which a line is believed where they agree with a pose no better than chance.
 const LEAST_LINE: usize = 15;
 
@@ -416,80 +414,6 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                 *inlier = s < limit;
             }
         }
-    }
-
-    /// True where at least half of all correspondences are displaced by less than the least motion of interest, and hardly
-    /// any inlier of the pose by more than twice as much.
-    fn hardly_moves(&self, evidence: &Evidence<'_, '_, T, B>) -> bool {
-        let still = RotationModel { rotation: Matrix3::identity(), scales: self.problem.scales }.matrix();
-        let sigma = self.least_motion / lit(EXPLAINED_SIGMAS);
-        if !(sigma > T::ZERO) {
-            return false;
-        }
-        if 2 * self.displaced_below(&still, self.least_motion) < self.problem.data.count as u32 {
-            return false;
-        }
-        let far = Evidence { sigma: sigma * T::TWO, ..*evidence }.explained(&still);
-        MOVED_ONE_IN * far.others <= far.inliers + far.others
-    }
-
-    /// How many correspondences a model displaces by less than `limit`.
-    fn displaced_below(&self, model: &Matrix3<T>, limit: T) -> u32 {
-        let limit = limit * limit;
-        let (mut near, mut left) = (0, self.problem.data.count);
-        for block in self.problem.data.blocks {
-            let (plane, weight) = block.planes();
-            let squared = transfer_sq(model, &plane, &weight);
-            near += squared.iter().take(left).map(|&s| (s < limit) as u32).sum::<u32>();
-            left = left.saturating_sub(LANES);
-        }
-        near
-    }
-
-    /// True where a rotation moves the points by no more than the noise.
-    fn stands_still(
-        &self,
-        evidence: &Evidence<'_, '_, T, B>,
-        rotation: &RotationModel<T>,
-        turned: &Explained<T>,
-    ) -> bool {
-        let still = RotationModel { rotation: Matrix3::identity(), scales: rotation.scales };
-        let explained = evidence.explained(&still.matrix());
-        // Nine in ten of what the rotation explains, with a mean square of the motion below the noise's.
-        let moved = explained.squares - turned.squares;
-        10 * explained.inliers >= 9 * turned.inliers && moved <= from_u32::<T>(explained.inliers) * T::TWO
-    }
-
-    /// No motion, or a refined rotation.
-    fn turned(
-        &self,
-        rotation: &RotationModel<T>,
-        still: bool,
-        sigma: T,
-        mask: &mut [bool],
-        estimate: &mut RelativePoseEstimate<T>,
-    ) {
-        let problem = self.transfer_problem(sigma * lit(EXPLAINED_SIGMAS));
-        let model = if still {
-            RotationModel { rotation: Matrix3::identity(), scales: rotation.scales }
-        } else {
-            *rotation
-        };
-        let loss = Loss::Truncated(problem.threshold);
-        let passes = if still { 1 } else { 8 };
-        let minimum = problem.optimise(&model, &loss, passes, lit(1e-6));
-        self.mark_transfer(&minimum.model.matrix(), mask);
-        let limit = problem.threshold * problem.threshold;
-        let variance = variance(&minimum.equations, problem.data.count, limit, 2);
-        estimate.noise_px = sqrt(variance);
-        estimate.verdict = if still {
-            RelativePoseVerdict::NoMotion
-        } else {
-            RelativePoseVerdict::PureRotation(PureRotation {
-                rotation: from_parts(&minimum.model.rotation, &Vector3::zeros()).rotation,
-                covariance: covariance(&minimum.equations, variance),
-            })
-        };
     }
 
     pub(super) fn transfer_problem(&self, threshold: T) -> TransferProblem<'_, T, B> {

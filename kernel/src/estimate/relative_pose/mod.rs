@@ -22,6 +22,7 @@ mod hypothesis;
 mod judge;
 mod planar;
 mod prior;
+mod rotation;
 mod verdict;
 
 use aided::ranked;
