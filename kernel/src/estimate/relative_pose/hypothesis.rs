@@ -33,6 +33,9 @@ pub(super) struct PoseProblem<'a, T: Real, B> {
     /// What is known of the rotation and enters every optimisation, and the variance of a residual that it is weighed
     /// against.
     pub(super) prior: Option<(&'a dyn RotationPrior<T>, T)>,
+    /// Correspondences off a plane that holds most: two of them in every sample, if there are any. A plane leaves two poses
+    /// and, with a little noise, all between them.
+    pub(super) off_plane: &'a [u32],
 }
 
 /// Blocks scored between two looks at the gate.
@@ -62,7 +65,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
     pub(super) fn new(data: BlockSlice<'a, B>, scales: Scales<T>, threshold: T) -> Self {
         let sine = threshold * lit(PARALLEL);
         let scales = Scales { parallel_sq: sine * sine, ..scales };
-        Self { data, scales, threshold, stride: stride(data.blocks.len()), prior: None }
+        Self { data, scales, threshold, stride: stride(data.blocks.len()), prior: None, off_plane: &[] }
     }
 
     /// The normalised points or bearings of a correspondence; none where it is not finite.
@@ -336,10 +339,19 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
     fn generate(&self, sample: &[u32; 5], found: &mut impl FnMut(&PoseModel<T>)) -> bool {
         let mut f1 = [Vector3::zeros(); 5];
         let mut f2 = [Vector3::zeros(); 5];
-        for ((a, b), &index) in f1.iter_mut().zip(&mut f2).zip(sample) {
+        let mut sample = *sample;
+        let off = self.off_plane;
+        if off.len() > 1 {
+            for index in sample.iter_mut().skip(3) {
+                let Some(&other) = off.get(*index as usize % off.len()) else { return false };
+                *index = other;
+            }
+        }
+        for ((a, b), &index) in f1.iter_mut().zip(&mut f2).zip(&sample) {
             let Some((x, y)) = self.directions(index) else { return false };
             (*a, *b) = (x, y);
         }
+        // As one twice in the sample is, too.
         if repeated(&f1, self.threshold) || repeated(&f2, self.threshold) {
             return false;
         }

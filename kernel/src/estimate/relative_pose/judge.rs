@@ -83,8 +83,10 @@ const TWIN_PASSES: u32 = 4;
 const PLANE_SHARE_OF_20: u32 = 17;
 /// Before it is refined to the end, so many.
 const LEAST_SHARE_OF_20: u32 = 13;
-/// A twin so close to the pose (squared distance of its rotation and translation, rad) leads back to it.
+/// A twin so close to the pose (squared distance of its rotation and translation, rad) leads back to it; a pose so far from
+/// another is another motion (3 degrees).
 const SAME_POSE_SQ: f64 = 0.0005;
+const OTHER_POSE_SQ: f64 = 0.0027;
 /// Accidents expected at the most where parallax counts as proven against a rotation: where it is hardly visible a general
 /// pose has no direction, so that little is lost.
 const ROTATION_ACCIDENTS: f64 = 1e-4;
@@ -92,12 +94,13 @@ const ROTATION_ACCIDENTS: f64 = 1e-4;
 /// than to hold one that is none.
 const PLANE_ACCIDENTS: f64 = 0.03;
 /// Where a plane explains more inliers than this, poses that differ hardly differ in cost: as many samples again, so
-/// many at the most, look for a better one.
+/// many at the least and at the most, each with two correspondences off the plane, look for a better one, and of two that
+/// explain the same neither is the verdict.
 const MORE_SHARE_OF_20: u32 = 16;
-const MORE_SAMPLES: u32 = 300;
+const MORE_SAMPLES: [u32; 2] = [60, 300];
 /// A pose that explains more correspondences than both poses of a plane do, by as many as this (in cost, where the noise is
 /// what it is said to be), is reported beside them: of exact planes one in forty has one, of real scenes that count as
-/// planes four in five.
+/// planes four in five. Of motions that differ by less none is proven.
 const RIVAL: f64 = 3.0;
 /// With how many others each correspondence is mispaired to measure what chance explains: at first, and where the verdict
 /// hangs on it.
@@ -223,13 +226,18 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                 let twins = self.twins(&plane);
                 let mut least = self.cost(&refined.model);
                 let pose = refined.model;
-                let leads_back = |twin: &PoseModel<T>| {
-                    let turn = (twin.rotation - pose.rotation).norm_squared() * T::HALF;
-                    turn + (twin.translation - pose.translation).norm_squared() < lit(SAME_POSE_SQ)
-                };
+                let leads_back = |twin: &PoseModel<T>| apart_sq(twin, &pose) < lit(SAME_POSE_SQ);
                 let mut moved = false;
+                // What a free pose gains of the noise grows with its square.
+                let louder = sigma / self.sigma;
+                let chance = lit::<T>(RIVAL) * louder * louder;
+                // Whether another motion explains as much as the best one but for chance.
+                let mut tied = false;
                 let hides = 20 * held > inliers * MORE_SHARE_OF_20;
-                if hides && let Some(other) = self.another(left, &mut estimate.report) {
+                if hides
+                    && let Some(other) =
+                        self.another(left, self.off(&plane, sigma, order), &mut estimate.report)
+                {
                     let cost = self.cost(&other.model);
                     if cost < least {
                         (refined, least, moved) = (other, cost, true);
@@ -247,9 +255,11 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                     if clear && leads_back(&near) {
                         continue;
                     }
-                    if self.cost(&near) < least + T::ONE {
+                    if self.cost(&near) < least + chance {
                         let other = self.refine(&near, REFINE_PASSES);
                         let cost = self.cost(&other.model);
+                        let differs = apart_sq(&other.model, &refined.model) > lit(OTHER_POSE_SQ);
+                        tied = (tied || (differs && cost < least + chance)) && cost + chance > least;
                         if cost < least {
                             (refined, least, moved) = (other, cost, true);
                         }
@@ -273,11 +283,10 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                         let accident = problem.accident(&refined.model, self.accident(), MISPAIRED_MORE);
                         evidence.proves_parallax(count, &explained, 8, accident, lit(PLANE_ACCIDENTS))
                     };
-                    if share && !bends() && !parallax() {
-                        // What a free pose gains of the noise grows with its square.
-                        let louder = sigma / self.sigma;
-                        let rival = lit::<T>(RIVAL) * louder * louder;
-                        if twins.iter().all(|twin| least + rival < twin.cost) {
+                    let flat = share && !bends() && !parallax();
+                    // What is off the plane may speak for two motions alike, and for neither of the plane's.
+                    if flat || (hides && tied) {
+                        if !flat || twins.iter().all(|twin| least + chance < twin.cost) {
                             estimate.general = Some(self.motion(&refined, &spread).0);
                         }
                         return self.planar(&plane, &twins, sigma, mask, estimate);
@@ -294,18 +303,24 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     /// The refined best of some more samples, where the search ended by itself and the budget is not spent; adds what they
     /// spend. Not inlined: its variables take no stack elsewhere.
     #[inline(never)]
-    fn another(&self, left: &mut Left<'_>, report: &mut RansacReport<T>) -> Option<Refined<T>> {
-        if report.stop != StopReason::Confident {
+    fn another(
+        &self,
+        left: &mut Left<'_>,
+        off_plane: &[u32],
+        report: &mut RansacReport<T>,
+    ) -> Option<Refined<T>> {
+        if report.stop != StopReason::Confident || left.searched == 0 {
             return None;
         }
-        let wanted = core::cmp::min(MORE_SAMPLES, left.searched);
+        let wanted = core::cmp::min(core::cmp::max(left.searched, MORE_SAMPLES[0]), MORE_SAMPLES[1]);
         let samples = core::cmp::min(wanted, left.budget.max_iterations);
         let budget = Budget { max_iterations: samples, ..left.budget };
         let options =
             RansacOptions { seed: !self.seed, min_iterations: samples, budget, ..RansacOptions::default() };
         let mut ask = after(report.spent, &mut left.keep_going);
         let keep_going = ask.as_mut().map(|ask| ask as &mut dyn FnMut(&_) -> bool);
-        let found = ransac::<T, _, 5>(self.problem, &options, None, LEAST_INLIERS, keep_going);
+        let problem = PoseProblem { off_plane, ..*self.problem };
+        let found = ransac::<T, _, 5>(&problem, &options, None, LEAST_INLIERS, keep_going);
         report.spent = report.spent.plus(&found.report.spent);
         report.stop = match found.report.stop {
             StopReason::Confident | StopReason::MaxIterations if samples == wanted => report.stop,
@@ -427,4 +442,9 @@ pub(super) fn pose_model<T: Real, B>(pose: &Pose<T>, problem: &PoseProblem<'_, T
         translation: pose.translation.vector,
         scales: problem.scales,
     }
+}
+
+/// The squared distance of two poses: of rotations by radians, of directions of translation.
+fn apart_sq<T: Real>(a: &PoseModel<T>, b: &PoseModel<T>) -> T {
+    (a.rotation - b.rotation).norm_squared() * T::HALF + (a.translation - b.translation).norm_squared()
 }

@@ -111,7 +111,8 @@ pub type RelativePoseError = TwoViewError;
 ///
 /// # Degeneracies
 /// See [`RelativePoseVerdict`]: none of them ends in a general pose. A plane is the verdict where it explains at least
-/// 17 in 20 inliers; no motion where the mean square motion is below the noise, or
+/// 17 in 20 inliers, or 16 where another motion, 3 degrees away and next to one of the plane's, explains as much but for
+/// what three of them are worth; no motion where the mean square motion is below the noise, or
 /// where the views hardly differ ([`RelativePoseOptions::least_motion_px`]).
 ///
 /// # Accuracy
@@ -122,10 +123,10 @@ pub type RelativePoseError = TwoViewError;
 ///
 /// # Cost
 /// At most `max_iterations` samples, by itself as many as the confidence needs for the inliers found, and without a
-/// prior as many again, 300 at the most, where a plane holds more than 16 in 20 of those, for there poses that differ
-/// hardly differ in cost; all of them where nothing is found, which by the default takes a third of a second for 200
-/// correspondences on a desktop computer: firmware sets a budget, or [`Guide::keep_going`]. Beyond a budget of
-/// residuals at most one refinement (five passes over 256 correspondences at the most, with a prior one, one score of
+/// prior as many again, 60 at the least and 300 at the most, each with two correspondences off the plane, where a plane
+/// holds more than 16 in 20 of those, for there poses that differ hardly differ in cost; all of them where nothing is
+/// found, which by the default takes a third of a second for 200 correspondences on a desktop computer: firmware sets a
+/// budget, or [`Guide::keep_going`]. Beyond a budget of residuals at most one refinement (five passes over 256 correspondences at the most, with a prior one, one score of
 /// all, and six passes over 32 to try a rotation), and the verdict's passes. A budget of fewer
 /// than n residuals, of 4 n with a prior, scores nothing. At half outliers a prior takes less than a third of the
 /// samples; a contradicted one costs its own search, of as many samples as a fifth of inliers needs, and one more

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::super::chance::EXPLAINED_SIGMAS;
 use super::super::scatter::Scatter;
 use super::covariance::planar_covariance;
 use super::judge::{Judge, pose_model};
@@ -179,6 +180,29 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         let (x, y) = ((t.x - seen.x * t.z) * s[0], (t.y - seen.y * t.z) * s[1]);
         let weight = (x * x + y * y) * *weights.get(lane)? / (depth * depth);
         (is_finite(value) && is_finite(weight)).then_some(InverseDepth { ray, value, weight })
+    }
+
+    /// The correspondences that a plane does not explain, in the memory given.
+    pub(super) fn off<'o>(&self, plane: &HomographyModel<T>, sigma: T, order: &'o mut [u32]) -> &'o [u32] {
+        let limit = sigma * lit(EXPLAINED_SIGMAS);
+        let limit = limit * limit;
+        let (mut index, mut length) = (0, 0);
+        let mut entries = order.iter_mut();
+        for block in self.problem.data.blocks {
+            let (points, weight) = block.planes();
+            for s in transfer_sq(&plane.0, &points, &weight) {
+                // A NaN is not explained.
+                if !(s < limit)
+                    && index < self.problem.data.count as u32
+                    && let Some(entry) = entries.next()
+                {
+                    *entry = index;
+                    length += 1;
+                }
+                index += 1;
+            }
+        }
+        order.get(..length).unwrap_or_default()
     }
 
     /// The up to two motions of a plane that keep its points in front of both cameras, the more likely one first.

@@ -13,8 +13,8 @@ use crate::{Real, Solutions};
 pub enum RelativePoseVerdict<T: Real> {
     /// A general motion in a scene that shows it.
     General(GeneralMotion<T>),
-    /// All inliers lie on one plane: the poses that explain its homography, the more likely one first. Two where both
-    /// keep the points in front of the cameras.
+    /// All inliers lie on one plane, or those off it speak for two motions alike: the poses that explain the plane's
+    /// homography, the more likely one first. Two where both keep the points in front of the cameras.
     Planar(Solutions<PlanarPose<T>, 2>),
     /// The camera turned and its centre stayed, as far as the noise lets see.
     PureRotation(PureRotation<T>),
@@ -80,7 +80,8 @@ pub struct RelativePoseEstimate<T: Real> {
     pub verdict: RelativePoseVerdict<T>,
     /// Of a planar scene: the general motion that explains correspondences off the plane or relief on it, more than both
     /// poses of the plane do by what three correspondences are worth (or more, where the noise is louder than it is said to
-    /// be), although by no more than chance might. Right where the scene is but nearly a plane, as most scenes are. None
+    /// be), although by no more than chance might; or the one of two general motions that explains a little more than
+    /// the other. Right where the scene is but nearly a plane, as most scenes are. None
     /// otherwise. The inliers are the plane's.
     pub general: Option<GeneralMotion<T>>,
     /// Of a prior: whether it fits; none without one, or where the verdict knows of no rotation.
