@@ -32,6 +32,7 @@ pub(crate) fn check<T: Real, const N: usize>(
 }
 
 /// No NaN and no infinity in the array of that number.
+#[cfg_attr(small, inline(never))]
 pub(crate) fn check_finite<T: Real, const N: usize>(
     vectors: &[SVector<T, N>],
     array: usize,

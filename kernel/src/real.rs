@@ -53,7 +53,9 @@ pub trait Real: RealField + Copy + sealed::Sealed {
 macro_rules! impl_real {
     ($t:ident, $sqrt:path, $sin_cos:path, $atan2:path, $ln:path, $exp:path, $cbrt:path) => {
         impl sealed::Sealed for $t {
-            #[inline(always)]
+            // Small code for Arm calls it: the instruction is reached through core registers.
+            #[cfg_attr(not(all(small, target_arch = "arm")), inline(always))]
+            #[cfg_attr(all(small, target_arch = "arm"), inline(never))]
             fn raw_sqrt(self) -> Self {
                 $sqrt(self)
             }

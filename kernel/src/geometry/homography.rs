@@ -1,9 +1,10 @@
 //! The homography `x2 ~ H x1` between two images of a plane, or of a purely rotating camera, and the motions it allows.
 
-use nalgebra::{Matrix3, Vector2, Vector3};
+use nalgebra::{ArrayStorage, Matrix3, Vector2, Vector3};
 
 use super::Pose;
 use super::pose::{from_parts, rotation_matrix};
+use crate::linalg::vec3::{cross, dot, scaled};
 use crate::linalg::{product, svd3, times};
 use crate::real::{abs, is_finite, lit, sqrt};
 use crate::{Real, Solutions};
@@ -163,9 +164,10 @@ impl<T: Real> Homography<T> {
         if !(s3 > lit::<T>(16.0) * T::EPSILON * s1) {
             return motions;
         }
-        let determinant = self.0.column(0).cross(&self.0.column(1)).dot(&self.0.column(2));
+        let [c0, c1, c2] = &self.0.data.0;
+        let determinant = dot(&cross(c0, c1), c2);
         let h = self.0 / if determinant < T::ZERO { -s2 } else { s2 };
-        let [v1, v2, v3] = svd.v.data.0.map(Vector3::from);
+        let [v1, v2, v3] = &svd.v.data.0;
         // (s1^2 - 1), (1 - s3^2) of the scaled H, without the cancellation of squares.
         // What rounding leaves of a double singular value is zero: its square root would not be small.
         let snap = |x: T| if x > lit::<T>(16.0) * T::EPSILON { x } else { T::ZERO };
@@ -180,18 +182,22 @@ impl<T: Real> Homography<T> {
             return motions;
         }
         let (p, q) = (sqrt(shrink / sum), sqrt(stretch / sum));
-        let h2 = times(&h, &v2);
+        let h2 = times(&h, &Vector3::from(*v2)).data.0[0];
         for sign in [T::ONE, -T::ONE] {
             // u and v2 span a plane whose vectors H does not stretch.
-            let u = v1 * p + v3 * (q * sign);
-            let hu = times(&h, &u);
-            let normal = v2.cross(&u);
-            let normal_in_2 = h2.cross(&hu);
-            let after = Matrix3::from_columns(&[h2, hu, normal_in_2]);
-            let r = product(&after, &Matrix3::from_columns(&[v2, u, normal]).transpose());
-            let t = times(&h, &normal) - normal_in_2;
-            motions.push(PlaneMotion { pose: from_parts(&r, &t), normal });
-            motions.push(PlaneMotion { pose: from_parts(&r, &-t), normal: -normal });
+            let (p, q) = (p, q * sign);
+            let u = [v1[0] * p + v3[0] * q, v1[1] * p + v3[1] * q, v1[2] * p + v3[2] * q];
+            let hu = times(&h, &Vector3::from(u)).data.0[0];
+            let normal = cross(v2, &u);
+            let normal_in_2 = cross(&h2, &hu);
+            let before = Matrix3::from_data(ArrayStorage([*v2, u, normal]));
+            let after = Matrix3::from_data(ArrayStorage([h2, hu, normal_in_2]));
+            let r = product(&after, &before.transpose());
+            let t = times(&h, &Vector3::from(normal)) - Vector3::from(normal_in_2);
+            for side in [T::ONE, -T::ONE] {
+                let pose = from_parts(&r, &(t * side));
+                motions.push(PlaneMotion { pose, normal: Vector3::from(scaled(&normal, side)) });
+            }
             // u = v1 or v3: the other sign gives the same plane.
             if stretch == T::ZERO || shrink == T::ZERO {
                 break;

@@ -1,8 +1,11 @@
 //! The rigid motion that maps world points into a camera: `x_cam = R X + t`.
 
-use nalgebra::{Isometry3, Matrix3, Matrix3x2, Quaternion, Translation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{
+    ArrayStorage, Isometry3, Matrix3, Matrix3x2, Quaternion, Translation3, UnitQuaternion, Vector3, Vector6,
+};
 
 use crate::Real;
+use crate::linalg::vec3::{cross, dot, less, scaled};
 use crate::linalg::{Svd3, product, svd3};
 use crate::real::{abs, atan2, is_finite, lit, max, sin_cos, sqrt, with_sign_of};
 
@@ -252,16 +255,17 @@ pub fn vector_angle<T: Real>(a: &Vector3<T>, b: &Vector3<T>) -> T {
 #[must_use]
 pub fn tangent_basis<T: Real>(n: &Vector3<T>) -> Matrix3x2<T> {
     let third = T::ONE / lit(3.0);
-    let pole = Vector3::new(T::TWO, T::ONE, T::TWO) * third;
-    let start = Vector3::new(T::TWO, -T::TWO, -T::ONE) * third;
-    let v = n + pole;
-    let square = v.norm_squared();
+    let (two, one) = (T::TWO * third, T::ONE * third);
+    let n = &n.data.0[0];
+    let v = [n[0] + two, n[1] + one, n[2] + two];
+    let start = [two, -two, -one];
+    let square = dot(&v, &v);
     // Of a difference of a few roundings not even the direction is known; `start` is orthogonal to such an `n` as it is.
     let known = square > T::EPSILON * T::EPSILON * lit(256.0);
-    let reflected = if known { start - v * (T::TWO * v.dot(&start) / square) } else { start };
-    let e1 = reflected - n * n.dot(&reflected);
-    let e1 = e1 * (T::ONE / sqrt(e1.norm_squared()));
-    Matrix3x2::from_columns(&[e1, n.cross(&e1)])
+    let reflected = if known { less(&start, &v, T::TWO * dot(&v, &start) / square) } else { start };
+    let e1 = less(&reflected, n, dot(n, &reflected));
+    let e1 = scaled(&e1, T::ONE / sqrt(dot(&e1, &e1)));
+    Matrix3x2::from_data(ArrayStorage([e1, cross(n, &e1)]))
 }
 
 /// The matrix of a rotation, by a call where code is to be small.
@@ -294,8 +298,9 @@ pub fn nearest_rotation<T: Real>(m: &Matrix3<T>) -> Option<Matrix3<T>> {
     let Svd3 { u, s, v } = svd3(m)?;
     let sign = if u.determinant() < T::ZERO { -T::ONE } else { T::ONE };
     let unique = s.y + sign * s.z > lit::<T>(16.0) * T::EPSILON * s.x;
-    let signs = Matrix3::from_diagonal(&Vector3::new(T::ONE, T::ONE, sign));
-    unique.then(|| product(&product(&u, &signs), &v.transpose()))
+    let mut u = u;
+    u.data.0[2] = scaled(&u.data.0[2], sign);
+    unique.then(|| product(&u, &v.transpose()))
 }
 
 /// The rotation that turns a frame until the direction `gravity` of it lies along +y: `R gravity ~ (0, 1, 0)`, by the

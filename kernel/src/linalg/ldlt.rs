@@ -1,6 +1,6 @@
 //! L D L' factors of a small symmetric positive definite matrix.
 
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, SVector};
 
 use crate::Real;
 use crate::real::from_u32;
@@ -42,7 +42,7 @@ impl<T: Real, const N: usize> Ldlt<T, N> {
     pub fn new(a: &SMatrix<T, N, N>) -> Option<Self> {
         let mut factors = Self { lower: [[T::ZERO; N]; N], inverse_d: [T::ZERO; N] };
         let Self { lower, inverse_d } = &mut factors;
-        factor(a.data.0.as_flattened(), lower.as_flattened_mut(), inverse_d)?;
+        factor(a.data.0.as_flattened(), None, lower.as_flattened_mut(), inverse_d)?;
         Some(factors)
     }
 
@@ -75,10 +75,71 @@ impl<T: Real, const N: usize> Ldlt<T, N> {
 
 // The work is done on slices, by functions that small code holds once for every N. Where N is known, no check is left.
 
-/// Row by row `L` and 1 / D of a matrix; none where it is not positive definite.
+/// The step `x = -A^-1 g` of a damped hessian, and by how much it promises to lower the cost; none where a direction is open.
+pub(crate) fn damped_step<T: Real, const N: usize>(
+    a: &SMatrix<T, N, N>,
+    g: &SVector<T, N>,
+    damping: T,
+) -> Option<(SVector<T, N>, T)> {
+    let (mut lower, mut inverse_d, mut x) = ([[T::ZERO; N]; N], [T::ZERO; N], *g);
+    let a = a.data.0.as_flattened();
+    let promise =
+        descend(a, &g.data.0[0], damping, lower.as_flattened_mut(), &mut inverse_d, &mut x.data.0[0])?;
+    Some((x, promise))
+}
+
+/// `scale A^-1`, symmetric to the bit; none where a direction is open.
+pub(crate) fn scaled_inverse<T: Real, const N: usize>(
+    a: &SMatrix<T, N, N>,
+    scale: T,
+) -> Option<SMatrix<T, N, N>> {
+    let (mut lower, mut columns, mut inverse_d) = ([[T::ZERO; N]; N], [[T::ZERO; N]; N], [T::ZERO; N]);
+    let mut inverse = *a;
+    let (lower, columns) = (lower.as_flattened_mut(), columns.as_flattened_mut());
+    scale_inverse(inverse.data.0.as_flattened_mut(), scale, lower, &mut inverse_d, columns)?;
+    Some(inverse)
+}
+
 #[cfg_attr(small, inline(never))]
 #[cfg_attr(not(small), inline(always))]
-fn factor<T: Real>(a: &[T], lower: &mut [T], inverse_d: &mut [T]) -> Option<()> {
+fn scale_inverse<T: Real>(
+    a: &mut [T],
+    scale: T,
+    lower: &mut [T],
+    inverse_d: &mut [T],
+    columns: &mut [T],
+) -> Option<()> {
+    factor(a, None, lower, inverse_d)?;
+    invert(lower, inverse_d, columns, a)?;
+    a.iter_mut().for_each(|x| *x *= scale);
+    Some(())
+}
+
+#[cfg_attr(small, inline(never))]
+#[cfg_attr(not(small), inline(always))]
+fn descend<T: Real>(
+    a: &[T],
+    g: &[T],
+    damping: T,
+    lower: &mut [T],
+    inverse_d: &mut [T],
+    x: &mut [T],
+) -> Option<T> {
+    factor(a, Some(damping), lower, inverse_d)?;
+    substitute(lower, inverse_d, x)?;
+    let mut promise = T::ZERO;
+    for (x, g) in x.iter_mut().zip(g) {
+        promise += *x * *g;
+        *x = -*x;
+    }
+    Some(promise)
+}
+
+/// Row by row `L` and 1 / D of a matrix whose diagonal elements are larger by the share `damping` if there is one; none where
+/// it is not positive definite.
+#[cfg_attr(small, inline(never))]
+#[cfg_attr(not(small), inline(always))]
+fn factor<T: Real>(a: &[T], damping: Option<T>, lower: &mut [T], inverse_d: &mut [T]) -> Option<()> {
     let n = inverse_d.len();
     let floor = from_u32::<T>(n as u32) * T::EPSILON;
     for i in 0..n {
@@ -92,6 +153,7 @@ fn factor<T: Real>(a: &[T], lower: &mut [T], inverse_d: &mut [T]) -> Option<()> 
             *row.get_mut(j)? = sum;
         }
         let diagonal = *a.get(i * n + i)?;
+        let diagonal = damping.map_or(diagonal, |damping| diagonal + damping * diagonal);
         let mut pivot = diagonal;
         for (x, inverse) in row.iter_mut().zip(&*inverse_d).take(i) {
             let scaled = *x * *inverse;

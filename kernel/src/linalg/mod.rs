@@ -19,14 +19,17 @@ pub mod poly;
 mod quartic;
 mod row_qr;
 mod svd3;
+pub(crate) mod vec3;
 
 pub use cubic::{cubic_roots, quadratic_roots};
 pub use eigen::{SymmetricEigen, symmetric_eigen};
 pub(crate) use elimination::Elimination;
 pub use lanes::{LANES, Lanes};
 pub use ldlt::Ldlt;
+pub(crate) use ldlt::{damped_step, scaled_inverse};
 pub(crate) use least_singular3::least_singular3;
 pub use lu::Lu;
+pub(crate) use null_space::null_space_of_columns;
 pub use null_space::{null_space, null_space_refined};
 pub use quartic::quartic_roots;
 pub use row_qr::{LeastSingular, RowQr};

@@ -66,14 +66,63 @@ pub fn null_space_refined<T: Real, const M: usize, const N: usize, const K: usiz
 fn reflect<T: Real, const M: usize, const N: usize, const K: usize, const REFINE: bool>(
     rows: &[[T; N]; M],
 ) -> Option<[[T; N]; K]> {
-    const { assert!(M + K == N, "the null space of M rows of length N has K = N - M vectors") };
-    // Element (c, r) is element c of row r: the loops over r are independent of one another.
     let mut a = [[T::ZERO; M]; N];
     for r in 0..M {
         for c in 0..N {
             a[c][r] = rows[r][c];
         }
     }
+    let scale = factor(&mut a)?;
+    let mut q: [[T; K]; N] = last_columns(&a, &scale);
+    if REFINE {
+        // A = L Q': the correction is Q L^-1 of the residual.
+        let mut y = [[T::ZERO; K]; N];
+        for k in 0..M {
+            let mut sum = [T::ZERO; K];
+            for c in 0..N {
+                for j in 0..K {
+                    sum[j] += rows[k][c] * q[c][j];
+                }
+            }
+            // Element (c, k) is that of L for c < k; scale v_kk is the reciprocal of its diagonal.
+            for c in 0..k {
+                for j in 0..K {
+                    sum[j] -= a[c][k] * y[c][j];
+                }
+            }
+            for j in 0..K {
+                y[k][j] = sum[j] * (scale[k] * a[k][k]);
+            }
+        }
+        reflect_back(&a, &scale, &mut y);
+        for c in 0..N {
+            for j in 0..K {
+                q[c][j] -= y[c][j];
+            }
+        }
+    }
+    let mut basis = [[T::ZERO; N]; K];
+    for j in 0..K {
+        for c in 0..N {
+            basis[j][c] = q[c][j];
+        }
+    }
+    Some(basis)
+}
+
+/// [`null_space`] of a matrix column by column, its vectors element by element.
+#[inline]
+pub(crate) fn null_space_of_columns<T: Real, const M: usize, const N: usize, const K: usize>(
+    mut columns: [[T; M]; N],
+) -> Option<[[T; K]; N]> {
+    let scale = factor(&mut columns)?;
+    Some(last_columns(&columns, &scale))
+}
+
+/// The reflections of a matrix column by column, left in its place, and their scales; none where rows are dependent.
+#[inline]
+fn factor<T: Real, const M: usize, const N: usize>(a: &mut [[T; M]; N]) -> Option<[T; M]> {
+    // Element (c, r) is element c of row r: the loops over r are independent of one another.
     let tolerance = lit::<T>(16.0) * T::EPSILON;
     let mut norm_sq = [T::ZERO; M];
     for c in 0..N {
@@ -116,49 +165,22 @@ fn reflect<T: Real, const M: usize, const N: usize, const K: usize, const REFINE
             }
         }
     }
-    if !full_rank {
-        return None;
-    }
-    // The reflections applied, the last first, to the last K unit vectors.
+    full_rank.then_some(scale)
+}
+
+/// The last K columns of Q: the reflections applied, the last first, to the last K unit vectors.
+#[inline]
+fn last_columns<T: Real, const M: usize, const N: usize, const K: usize>(
+    a: &[[T; M]; N],
+    scale: &[T; M],
+) -> [[T; K]; N] {
+    const { assert!(M + K == N, "the null space of M rows of length N has K = N - M vectors") };
     let mut q = [[T::ZERO; K]; N];
     for j in 0..K {
         q[M + j][j] = T::ONE;
     }
-    reflect_back(&a, &scale, &mut q);
-    if REFINE {
-        // A = L Q': the correction is Q L^-1 of the residual.
-        let mut y = [[T::ZERO; K]; N];
-        for k in 0..M {
-            let mut sum = [T::ZERO; K];
-            for c in 0..N {
-                for j in 0..K {
-                    sum[j] += rows[k][c] * q[c][j];
-                }
-            }
-            // Element (c, k) is that of L for c < k; scale v_kk is the reciprocal of its diagonal.
-            for c in 0..k {
-                for j in 0..K {
-                    sum[j] -= a[c][k] * y[c][j];
-                }
-            }
-            for j in 0..K {
-                y[k][j] = sum[j] * (scale[k] * a[k][k]);
-            }
-        }
-        reflect_back(&a, &scale, &mut y);
-        for c in 0..N {
-            for j in 0..K {
-                q[c][j] -= y[c][j];
-            }
-        }
-    }
-    let mut basis = [[T::ZERO; N]; K];
-    for j in 0..K {
-        for c in 0..N {
-            basis[j][c] = q[c][j];
-        }
-    }
-    Some(basis)
+    reflect_back(a, scale, &mut q);
+    q
 }
 
 /// Applies the reflections, the last first, to K columns.

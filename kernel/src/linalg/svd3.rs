@@ -1,8 +1,9 @@
 //! Singular values of a 3x3 matrix.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{ArrayStorage, Matrix3, Vector3};
 
 use super::eigen::jacobi_angle;
+use super::vec3::{cross, dot, less, over, scaled};
 use crate::Real;
 use crate::real::{abs, lit, min, sqrt};
 
@@ -56,21 +57,20 @@ pub fn svd3<T: Real>(a: &Matrix3<T>) -> Option<Svd3<T>> {
     if largest == T::ZERO {
         return Some(Svd3 { u: super::identity(), s: Vector3::zeros(), v: super::identity() });
     }
-    let mut m = a.data.0;
-    m.iter_mut().flatten().for_each(|x| *x /= largest);
-    let [mut m0, mut m1, mut m2] = m.map(Vector3::from);
-    let mut v0 = Vector3::new(T::ONE, T::ZERO, T::ZERO);
-    let mut v1 = Vector3::new(T::ZERO, T::ONE, T::ZERO);
-    let mut v2 = Vector3::new(T::ZERO, T::ZERO, T::ONE);
-
     // Columns of A V are made orthogonal; V gathers the rotations.
-    let floor = T::EPSILON * T::EPSILON * (m0.norm_squared() + m1.norm_squared() + m2.norm_squared());
+    let mut columns = [[[T::ZERO; 3]; 2]; 3];
+    for k in 0..3 {
+        columns[k] = [over(&a.data.0[k], largest), [T::ZERO; 3]];
+        columns[k][1][k] = T::ONE;
+    }
+    let [a, b, c] = &mut columns;
+    let floor = T::EPSILON * T::EPSILON * (dot(&a[0], &a[0]) + dot(&b[0], &b[0]) + dot(&c[0], &c[0]));
     let mut converged = false;
     for _ in 0..MAX_SWEEPS {
-        let a = orthogonalise(&mut m0, &mut m1, &mut v0, &mut v1, floor);
-        let b = orthogonalise(&mut m0, &mut m2, &mut v0, &mut v2, floor);
-        let c = orthogonalise(&mut m1, &mut m2, &mut v1, &mut v2, floor);
-        if a && b && c {
+        let ab = orthogonalise(a, b, floor);
+        let ac = orthogonalise(a, c, floor);
+        let bc = orthogonalise(b, c, floor);
+        if ab && ac && bc {
             converged = true;
             break;
         }
@@ -79,68 +79,70 @@ pub fn svd3<T: Real>(a: &Matrix3<T>) -> Option<Svd3<T>> {
         return None;
     }
     // Largest first.
-    sort(&mut m0, &mut m1, &mut v0, &mut v1);
-    sort(&mut m1, &mut m2, &mut v1, &mut v2);
-    sort(&mut m0, &mut m1, &mut v0, &mut v1);
+    sort(a, b);
+    sort(b, c);
+    sort(a, b);
 
-    let s0 = sqrt(m0.norm_squared());
-    let u0 = m0 / s0;
+    let [[a, va], [b, vb], [c, vc]] = &columns;
+    let s0 = sqrt(dot(a, a));
+    let u0 = over(a, s0);
     // A small second column keeps an error along the first: it is taken out once more.
-    let rest = m1 - u0 * u0.dot(&m1);
-    let s1 = sqrt(rest.norm_squared());
-    let u1 = if s1 > T::EPSILON * s0 { rest / s1 } else { perpendicular(&u0) };
-    let u2 = u0.cross(&u1);
-    let s2 = u2.dot(&m2);
-    let u2 = if s2 < -T::EPSILON * s0 { -u2 } else { u2 };
+    let rest = less(b, &u0, dot(&u0, b));
+    let s1 = sqrt(dot(&rest, &rest));
+    let u1 = if s1 > T::EPSILON * s0 { over(&rest, s1) } else { perpendicular(&u0) };
+    let u2 = cross(&u0, &u1);
+    let s2 = dot(&u2, c);
+    let u2 = if s2 < -T::EPSILON * s0 { scaled(&u2, -T::ONE) } else { u2 };
+    // Equal values stay in order whatever their rounding.
+    let s1 = min(s1, s0);
     Some(Svd3 {
-        u: Matrix3::from_columns(&[u0, u1, u2]),
-        // Equal values stay in order whatever their rounding.
-        s: Vector3::new(s0, min(s1, s0), min(abs(s2), min(s1, s0))) * largest,
-        v: Matrix3::from_columns(&[v0, v1, v2]),
+        u: Matrix3::from_data(ArrayStorage([u0, u1, u2])),
+        s: Vector3::new(s0, s1, min(abs(s2), s1)) * largest,
+        v: Matrix3::from_data(ArrayStorage([*va, *vb, *vc])),
     })
 }
 
-/// Rotates the columns `a` and `b` so that they become orthogonal, and `va`, `vb` with them; true where they were.
+/// A column of A V, and that of V.
+type Column<T> = [[T; 3]; 2];
+
+/// Rotates two columns so that those of A V become orthogonal; true where they were.
 #[cfg_attr(not(small), inline(always))]
-fn orthogonalise<T: Real>(
-    a: &mut Vector3<T>,
-    b: &mut Vector3<T>,
-    va: &mut Vector3<T>,
-    vb: &mut Vector3<T>,
-    floor: T,
-) -> bool {
-    let (aa, ab, bb) = (a.norm_squared(), a.dot(b), b.norm_squared());
+fn orthogonalise<T: Real>(a: &mut Column<T>, b: &mut Column<T>, floor: T) -> bool {
+    let (aa, ab, bb) = (dot(&a[0], &a[0]), dot(&a[0], &b[0]), dot(&b[0], &b[0]));
     // Orthogonal to rounding, or so small beside the matrix that its direction means nothing.
     let bound = lit::<T>(4.0) * T::EPSILON;
     if ab * ab <= bound * bound * aa * bb || abs(ab) <= floor {
         return true;
     }
     let (sine, _, cosine) = jacobi_angle(aa, ab, bb);
-    (*a, *b) = (*a * cosine - *b * sine, *a * sine + *b * cosine);
-    (*va, *vb) = (*va * cosine - *vb * sine, *va * sine + *vb * cosine);
+    for (a, b) in a.as_flattened_mut().iter_mut().zip(b.as_flattened_mut()) {
+        (*a, *b) = (*a * cosine - *b * sine, *a * sine + *b * cosine);
+    }
     false
 }
 
-/// Exchanges two columns of A V and V where the second is the longer; with a change of sign it is a rotation: V stays one.
+/// Exchanges two columns where the second of A V is the longer; with a change of sign it is a rotation: V stays one.
 #[cfg_attr(not(small), inline(always))]
 #[cfg_attr(small, inline(never))]
-fn sort<T: Real>(a: &mut Vector3<T>, b: &mut Vector3<T>, va: &mut Vector3<T>, vb: &mut Vector3<T>) {
-    if b.norm_squared() > a.norm_squared() {
-        (*a, *b, *va, *vb) = (*b, -*a, *vb, -*va);
+fn sort<T: Real>(a: &mut Column<T>, b: &mut Column<T>) {
+    if dot(&b[0], &b[0]) > dot(&a[0], &a[0]) {
+        for (a, b) in a.as_flattened_mut().iter_mut().zip(b.as_flattened_mut()) {
+            (*a, *b) = (*b, -*a);
+        }
     }
 }
 
 /// A unit vector perpendicular to the unit vector `a`.
 #[inline]
-fn perpendicular<T: Real>(a: &Vector3<T>) -> Vector3<T> {
-    let (x, y, z) = (abs(a.x), abs(a.y), abs(a.z));
+fn perpendicular<T: Real>(&[a, b, c]: &[T; 3]) -> [T; 3] {
+    let (x, y, z) = (abs(a), abs(b), abs(c));
     let o = T::ZERO;
     let p = if x <= y && x <= z {
-        Vector3::new(o, a.z, -a.y)
+        [o, c, -b]
     } else if y <= z {
-        Vector3::new(-a.z, o, a.x)
+        [-c, o, a]
     } else {
-        Vector3::new(a.y, -a.x, o)
+        [b, -a, o]
     };
-    p / sqrt(p.norm_squared())
+    over(&p, sqrt(dot(&p, &p)))
 }

@@ -157,7 +157,8 @@ impl<T: Real> CameraModel<T> for Pinhole<T> {
         finite((pixel, jacobian), jacobian.as_slice())
     }
 
-    #[inline]
+    #[cfg_attr(not(small), inline)]
+    #[cfg_attr(small, inline(never))]
     fn unproject(&self, pixel: &Vector2<T>) -> Result<Vector3<T>, UnprojectError> {
         self.unproject_with_jacobian(pixel).map(|(bearing, _)| bearing)
     }

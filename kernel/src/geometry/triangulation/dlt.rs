@@ -170,7 +170,7 @@ pub fn triangulate_dlt<T: Real>(
         return Ok(Triangulation::Undetermined);
     }
     let ray = |pose: &Pose<T>, bearing: &Vector3<T>| {
-        let d = super::scaled(&(pose.rotation.inverse() * bearing))?;
+        let d = Vector3::from(super::scaled(&(pose.rotation.inverse() * bearing))?);
         Some((d * (T::ONE / sqrt(d.norm_squared())), (centre(pose) - origin) / scale))
     };
     let mut qr = RowQr::<T, 4>::new();

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::{Triangulation, ViewPair, judge, judge_parallel, parallel_sine};
 use crate::Real;
+use crate::linalg::vec3::{cross, dot};
 
 impl<T: Real> ViewPair<T> {
     /// The midpoint of the shortest segment between the two rays, in the frame of view 1.
@@ -40,18 +41,20 @@ impl<T: Real> ViewPair<T> {
     /// ```
     #[inline]
     pub fn triangulate_midpoint(&self, x1: &Vector3<T>, x2: &Vector3<T>) -> Triangulation<T> {
-        let d2 = self.rotation.tr_mul(x2);
-        let c = &self.centre;
-        let p = x1.cross(&d2);
-        let sine_sq = p.norm_squared();
-        let limit = parallel_sine::<T>() * parallel_sine::<T>() * x1.norm_squared() * d2.norm_squared();
+        let (a, b, c) = (&x1.data.0[0], &x2.data.0[0], &self.centre.data.0[0]);
+        let d2 = self.rotation.data.0.map(|column| dot(&column, b));
+        let p = cross(a, &d2);
+        let sine_sq = dot(&p, &p);
+        let limit = parallel_sine::<T>() * parallel_sine::<T>() * dot(a, a) * dot(&d2, &d2);
         // Also false for NaN, and where the squares overflow or underflow.
         if !(sine_sq > limit && sine_sq >= T::MIN_POSITIVE && sine_sq <= T::MAX) {
-            return judge_parallel(self.centre, *x1, d2);
+            return judge_parallel(self.centre, *x1, d2.into());
         }
-        let depth1 = p.dot(&c.cross(&d2));
-        let depth2 = p.dot(&c.cross(x1));
-        let point = (x1 * depth1 + d2 * depth2) * (T::HALF / sine_sq) + c * T::HALF;
-        judge(c, point, depth1, depth2)
+        let depth1 = dot(&p, &cross(c, &d2));
+        let depth2 = dot(&p, &cross(c, a));
+        let scale = T::HALF / sine_sq;
+        let at = |k: usize| (a[k] * depth1 + d2[k] * depth2) * scale + c[k] * T::HALF;
+        let point = Vector3::new(at(0), at(1), at(2));
+        judge(&self.centre, point, depth1, depth2)
     }
 }

@@ -17,6 +17,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::Pose;
 use super::pose::{rotation_matrix, vector_angle};
 use crate::Real;
+use crate::linalg::vec3::{cross, dot, over};
 use crate::real::{abs, is_finite, lit, max, sqrt};
 
 mod covariance;
@@ -125,43 +126,54 @@ impl<T: Real> ViewPair<T> {
 }
 
 /// The verdict on a point with the signs of its depths along the two bearings; `centre` of view 2 in the frame of view 1.
-#[inline]
+#[inline(always)]
 fn judge<T: Real>(centre: &Vector3<T>, point: Vector3<T>, depth1: T, depth2: T) -> Triangulation<T> {
     // The sum is finite only where every term is; a smaller depth has lost digits to underflow.
     let size = abs(point.x) + abs(point.y) + abs(point.z);
     let least = T::MIN_POSITIVE / T::EPSILON;
     if depth1 >= least && depth2 >= least && size <= T::MAX {
-        Triangulation::Point(point)
+        return Triangulation::Point(point);
+    }
+    let front = [depth1 > T::ZERO, depth2 > T::ZERO];
+    if is_behind(*centre, point, depth1, depth2) {
+        let count = 2 - front[0] as usize - front[1] as usize;
+        Triangulation::Behind { point, view: front[0] as usize, count }
     } else {
-        judge_behind(*centre, point, depth1, depth2)
+        Triangulation::Undetermined
     }
 }
 
-// The arguments by value: a reference would force the hot path to keep them in memory.
+// The rarer answers are told by functions that do not make them, so that a program that asks for points alone drops these;
+// the arguments by value: a reference would force the hot path to keep them in memory.
 #[cold]
-fn judge_behind<T: Real>(centre: Vector3<T>, point: Vector3<T>, depth1: T, depth2: T) -> Triangulation<T> {
-    let front = [depth1 > T::ZERO, depth2 > T::ZERO];
+fn is_behind<T: Real>(centre: Vector3<T>, point: Vector3<T>, depth1: T, depth2: T) -> bool {
     let finite = is_finite(depth1) && is_finite(depth2) && all_finite(&point);
-    if !finite || centre == Vector3::zeros() || front == [true, true] {
-        return Triangulation::Undetermined;
-    }
-    let count = front.iter().filter(|f| !**f).count();
-    Triangulation::Behind { point, view: if front[0] { 1 } else { 0 }, count }
+    let moved = centre.x != T::ZERO || centre.y != T::ZERO || centre.z != T::ZERO;
+    finite && moved && !(depth1 > T::ZERO && depth2 > T::ZERO)
 }
 
 /// The verdict where the rays `x1` and `d2`, both in the frame of view 1, have no parallax.
-#[cold]
+#[inline(always)]
 fn judge_parallel<T: Real>(centre: Vector3<T>, x1: Vector3<T>, d2: Vector3<T>) -> Triangulation<T> {
-    let (Some(x1), Some(d2), Some(c)) = (scaled(&x1), scaled(&d2), scaled(&centre)) else {
-        return Triangulation::Undetermined;
-    };
-    let limit = parallel_sine::<T>() * parallel_sine::<T>();
-    let length_sq = x1.norm_squared();
-    let parallel = |v: &Vector3<T>| x1.cross(v).norm_squared() <= limit * length_sq * v.norm_squared();
-    if !parallel(&d2) || parallel(&c) || x1.dot(&d2) <= T::ZERO {
-        return Triangulation::Undetermined;
+    if is_at_infinity(centre, x1, d2)
+        && let Some(x1) = scaled(&x1)
+    {
+        Triangulation::AtInfinity { direction: over(&x1, sqrt(dot(&x1, &x1))).into() }
+    } else {
+        Triangulation::Undetermined
     }
-    Triangulation::AtInfinity { direction: x1 / sqrt(length_sq) }
+}
+
+#[cold]
+fn is_at_infinity<T: Real>(centre: Vector3<T>, x1: Vector3<T>, d2: Vector3<T>) -> bool {
+    let (Some(x1), Some(d2), Some(c)) = (scaled(&x1), scaled(&d2), scaled(&centre)) else { return false };
+    let limit = parallel_sine::<T>() * parallel_sine::<T>();
+    let length_sq = dot(&x1, &x1);
+    let parallel = |v: &[T; 3]| {
+        let normal = cross(&x1, v);
+        dot(&normal, &normal) <= limit * length_sq * dot(v, v)
+    };
+    parallel(&d2) && !parallel(&c) && !(dot(&x1, &d2) <= T::ZERO)
 }
 
 fn all_finite<T: Real>(v: &Vector3<T>) -> bool {
@@ -169,11 +181,11 @@ fn all_finite<T: Real>(v: &Vector3<T>) -> bool {
 }
 
 /// The vector over its largest coordinate; none for zero and what is not finite.
-fn scaled<T: Real>(v: &Vector3<T>) -> Option<Vector3<T>> {
+fn scaled<T: Real>(v: &Vector3<T>) -> Option<[T; 3]> {
     let size = max(abs(v.x), max(abs(v.y), abs(v.z)));
     if !(all_finite(v) && size > T::ZERO) {
         return None;
     }
-    let unit = v / size;
-    all_finite(&unit).then_some(unit)
+    let unit = over(&v.data.0[0], size);
+    all_finite(&unit.into()).then_some(unit)
 }

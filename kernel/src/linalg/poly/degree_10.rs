@@ -165,7 +165,8 @@ fn roots_in_chart<T: Real, const L: usize>(
 }
 
 /// Bernstein coefficients on [0, 1] of the polynomial in `t = side * x`.
-#[inline]
+#[cfg_attr(not(small), inline)]
+#[cfg_attr(small, inline(never))]
 fn bernstein<T: Real>(c: &Coefficients<T>, side: T) -> Coefficients<T> {
     // 10 choose i; whole numbers, for a table of f64 would be converted by software on a core without them.
     const BINOMIALS: [u32; 11] = [1, 10, 45, 120, 210, 252, 210, 120, 45, 10, 1];

@@ -67,44 +67,42 @@ fn quadric_times_linear<T: Real>(q: &Quadric<T>, l: &Linear<T>) -> Cubic<T> {
     ]
 }
 
-/// `E E' E - tr(E E') E / 2 = 0` (nine cubics) and `det E = 0`, of the entries of `E` (row by row) as linear forms.
+/// The sum of three products.
+#[cfg_attr(not(small), inline(always))]
+#[cfg_attr(small, inline(never))]
+fn linear_dot<T: Real>(a: &[&Linear<T>; 3], b: &[&Linear<T>; 3]) -> Quadric<T> {
+    let product = |k: usize| linear_times_linear(a[k], b[k]);
+    add(&add(&product(0), &product(1)), &product(2))
+}
+
+/// The sum of three products.
+#[cfg_attr(not(small), inline(always))]
+#[cfg_attr(small, inline(never))]
+fn quadric_dot<T: Real>(q: &[&Quadric<T>; 3], l: &[&Linear<T>; 3]) -> Cubic<T> {
+    let product = |k: usize| quadric_times_linear(q[k], l[k]);
+    add(&add(&product(0), &product(1)), &product(2))
+}
+
+/// Writes `E E' E - tr(E E') E / 2 = 0` (nine cubics) and `det E = 0`, of the entries of `E` (row by row) as linear forms.
 #[inline(never)]
-pub(super) fn essential_cubics<T: Real>(e: &[Linear<T>; 9]) -> [Cubic<T>; 10] {
-    let row_products = |r: usize, s: usize| {
-        let p = linear_times_linear(&e[3 * r], &e[3 * s]);
-        let q = linear_times_linear(&e[3 * r + 1], &e[3 * s + 1]);
-        let t = linear_times_linear(&e[3 * r + 2], &e[3 * s + 2]);
-        add(&add(&p, &q), &t)
-    };
-    let (a00, a11, a22) = (row_products(0, 0), row_products(1, 1), row_products(2, 2));
-    let (a01, a02, a12) = (row_products(0, 1), row_products(0, 2), row_products(1, 2));
+pub(super) fn essential_cubics<T: Real>(e: &[Linear<T>; 9], cubics: &mut [Cubic<T>; 10]) {
+    let [e0, e1, e2, e3, e4, e5, e6, e7, e8] = e;
+    let rows = [[e0, e1, e2], [e3, e4, e5], [e6, e7, e8]];
+    let product = |r: usize, s: usize| linear_dot(&rows[r], &rows[s]);
+    let (a00, a11, a22) = (product(0, 0), product(1, 1), product(2, 2));
+    let (a01, a02, a12) = (product(0, 1), product(0, 2), product(1, 2));
     let half_trace = add(&add(&a00, &a11), &a22).map(|v| v * T::HALF);
     // L = E E' - tr(E E') / 2, symmetric.
     let (l00, l11, l22) = (sub(&a00, &half_trace), sub(&a11, &half_trace), sub(&a22, &half_trace));
     let l = [[&l00, &a01, &a02], [&a01, &l11, &a12], [&a02, &a12, &l22]];
-    let trace = |r: usize, c: usize| {
-        let p = quadric_times_linear(l[r][0], &e[c]);
-        let q = quadric_times_linear(l[r][1], &e[3 + c]);
-        let t = quadric_times_linear(l[r][2], &e[6 + c]);
-        add(&add(&p, &q), &t)
-    };
+    let columns = [[e0, e3, e6], [e1, e4, e7], [e2, e5, e8]];
     let minor = |a: usize, b: usize| {
-        sub(&linear_times_linear(&e[3 + a], &e[6 + b]), &linear_times_linear(&e[3 + b], &e[6 + a]))
+        sub(&linear_times_linear(rows[1][a], rows[2][b]), &linear_times_linear(rows[1][b], rows[2][a]))
     };
-    let det = add(
-        &add(&quadric_times_linear(&minor(1, 2), &e[0]), &quadric_times_linear(&minor(2, 0), &e[1])),
-        &quadric_times_linear(&minor(0, 1), &e[2]),
-    );
-    [
-        trace(0, 0),
-        trace(0, 1),
-        trace(0, 2),
-        trace(1, 0),
-        trace(1, 1),
-        trace(1, 2),
-        trace(2, 0),
-        trace(2, 1),
-        trace(2, 2),
-        det,
-    ]
+    cubics[9] = quadric_dot(&[&minor(1, 2), &minor(2, 0), &minor(0, 1)], &rows[0]);
+    for (traces, l) in cubics.as_chunks_mut::<3>().0.iter_mut().zip(&l) {
+        for (trace, column) in traces.iter_mut().zip(&columns) {
+            *trace = quadric_dot(l, column);
+        }
+    }
 }

@@ -10,7 +10,7 @@ use self::cubics::essential_cubics;
 use self::hidden::{HiddenRow, determinant, unknowns};
 use crate::geometry::{Essential, Pose};
 use crate::linalg::batch::{BATCH, Batch};
-use crate::linalg::null_space;
+use crate::linalg::null_space_of_columns;
 use crate::linalg::poly::{LeastDetermined, projective_roots_10, real_roots_10};
 use crate::real::{abs, lit, min};
 use crate::{Real, Solutions};
@@ -120,7 +120,9 @@ pub fn relpose_5pt_poses<T: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) ->
 #[inline(never)]
 fn solve<T: Real, W: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5], found: &mut Found<T>) {
     let mut rows = [HiddenRow::ZERO; 3];
-    if null_basis(x1, x2, &mut found.basis).is_none() || hidden_rows(&found.basis, &mut rows).is_none() {
+    let Some(basis) = null_basis(x1, x2) else { return };
+    found.basis = basis;
+    if hidden_rows(&found.basis, &mut rows).is_none() {
         return;
     }
     let [inside, outside] = found.add_roots(&rows, Chart::<T, W>::Line);
@@ -138,34 +140,25 @@ fn solve<T: Real, W: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5], found: &m
 
 /// An orthonormal basis, element by element, of the matrices that the five equations leave.
 #[inline(never)]
-fn null_basis<T: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5], basis: &mut [[T; 4]; 9]) -> Option<()> {
-    let mut rows = [[T::ZERO; 9]; 5];
-    for ((row, a), b) in rows.iter_mut().zip(x1).zip(x2) {
-        *row = [
-            b.x * a.x,
-            b.x * a.y,
-            b.x * a.z,
-            b.y * a.x,
-            b.y * a.y,
-            b.y * a.z,
-            b.z * a.x,
-            b.z * a.y,
-            b.z * a.z,
-        ];
-    }
-    let null = null_space::<T, 5, 9, 4>(&rows)?;
-    for (k, vector) in null.iter().enumerate() {
-        for (row, &v) in basis.iter_mut().zip(vector) {
-            row[k] = v;
+fn null_basis<T: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) -> Option<[[T; 4]; 9]> {
+    let mut columns = [[T::ZERO; 5]; 9];
+    for r in 0..5 {
+        let (a, b) = (&x1[r].data.0[0], &x2[r].data.0[0]);
+        for i in 0..3 {
+            for j in 0..3 {
+                columns[3 * i + j][r] = b[i] * a[j];
+            }
         }
     }
-    Some(())
+    null_space_of_columns(columns)
 }
 
 /// The three equations that the coefficients of the basis matrices satisfy.
 #[inline(never)]
 fn hidden_rows<T: Real>(basis: &[[T; 4]; 9], rows: &mut [HiddenRow<T>; 3]) -> Option<()> {
-    hidden::eliminate(&mut essential_cubics(basis), rows)
+    let mut cubics = [[T::ZERO; 20]; 10];
+    essential_cubics(basis, &mut cubics);
+    hidden::eliminate(&mut cubics, rows)
 }
 
 #[inline(always)]
@@ -189,11 +182,15 @@ struct Candidates<T> {
 }
 
 impl<T: Real> Candidates<T> {
-    #[inline]
-    fn push(&mut self, root: T) {
-        if let Some(slot) = self.roots.get_mut(self.len) {
-            *slot = root;
-            self.len += 1;
+    /// Adds roots, each times `scale`.
+    #[cfg_attr(not(small), inline)]
+    #[cfg_attr(small, inline(never))]
+    fn extend<W: Real>(&mut self, roots: &[W], scale: W) {
+        for &root in roots {
+            if let Some(slot) = self.roots.get_mut(self.len) {
+                *slot = narrow(root * scale);
+                self.len += 1;
+            }
         }
     }
 }
@@ -257,9 +254,9 @@ impl<T: Real> Found<T> {
         match chart {
             Chart::Line => {
                 let [inside, outside] = projective_roots_10(&polynomial, error);
-                inside.as_slice().iter().for_each(|&x| candidates.push(narrow(x)));
+                candidates.extend(inside.as_slice(), W::ONE);
                 candidates.inside = candidates.len;
-                outside.as_slice().iter().for_each(|&x| candidates.push(narrow(x)));
+                candidates.extend(outside.as_slice(), W::ONE);
                 worst = [inside.least_determined(), outside.least_determined()];
             }
             Chart::Disc { radius, .. } => {
@@ -268,7 +265,7 @@ impl<T: Real> Found<T> {
                     scale *= radius;
                 }
                 let roots = real_roots_10(&polynomial, error);
-                roots.as_slice().iter().for_each(|&x| candidates.push(narrow(x * radius)));
+                candidates.extend(roots.as_slice(), radius);
                 worst = [roots.least_determined(); 2];
             }
         }
