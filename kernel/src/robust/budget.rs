@@ -183,6 +183,7 @@ pub struct Progress {
 
 impl Progress {
     /// This, and what another search spent; the inliers are this one's.
+    #[cfg_attr(small, inline(never))]
     pub(crate) fn plus(&self, other: &Self) -> Self {
         Self {
             iterations: self.iterations.saturating_add(other.iterations),

@@ -119,10 +119,10 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
         near_miss_interval: E::NEAR_MISS_INTERVAL,
         score_passes: E::SCORE_PASSES,
     };
-    let mut search = Search::new(options, order, count, size, least_inliers, manners);
+    let mut search = Search::new(options, order.is_some(), count, size, least_inliers, manners);
     let mut best: Option<(E::Model, Score<T>)> = None;
     let mut sample = [0; S];
-    while search.next(&mut sample, &mut keep_going) {
+    while search.next(order, &mut sample, &mut keep_going) {
         if best.is_some_and(|(model, _)| estimator.repeats(&sample, &model)) {
             continue;
         }
@@ -187,13 +187,11 @@ struct Manners {
 /// What a run keeps beside its model: the same code for every estimator.
 struct Search<'a, T> {
     options: &'a RansacOptions<T>,
-    order: Option<&'a [u32]>,
     count: u32,
     size: u32,
     least_inliers: u32,
     manners: Manners,
-    uniform: Sampler<T>,
-    ranked: Sampler<T>,
+    sampler: Sampler<T>,
     spent: Progress,
     counts: ScoreCounts,
     refined_residuals: u64,
@@ -214,7 +212,7 @@ struct Search<'a, T> {
 impl<'a, T: Real> Search<'a, T> {
     fn new(
         options: &'a RansacOptions<T>,
-        order: Option<&'a [u32]>,
+        ranked: bool,
         count: u32,
         size: u32,
         least_inliers: u32,
@@ -224,13 +222,15 @@ impl<'a, T: Real> Search<'a, T> {
         let one_score = manners.score_passes as u64 * count as u64;
         Self {
             options,
-            order,
             count,
             size,
             least_inliers,
             manners,
-            uniform: Sampler::uniform(options.seed, count),
-            ranked: Sampler::ranked(options.seed, count, size),
+            sampler: if ranked {
+                Sampler::ranked(options.seed, count, size)
+            } else {
+                Sampler::uniform(options.seed, count)
+            },
             spent: Progress::default(),
             gate: gate(T::MAX, least_inliers, count, &counts),
             counts,
@@ -248,6 +248,7 @@ impl<'a, T: Real> Search<'a, T> {
     /// Draws the sample of another iteration; false where the run ends.
     fn next(
         &mut self,
+        order: Option<&[u32]>,
         sample: &mut [u32],
         keep_going: &mut Option<&mut dyn FnMut(&Progress) -> bool>,
     ) -> bool {
@@ -280,9 +281,8 @@ impl<'a, T: Real> Search<'a, T> {
             return false;
         }
         // Ranked samples first, and every other time.
-        let order = if spent.iterations.is_multiple_of(2) { self.order } else { None };
-        let sampler = if order.is_some() { &mut self.ranked } else { &mut self.uniform };
-        if !sampler.draw(spent.iterations, sample) {
+        let order = order.filter(|_| spent.iterations.is_multiple_of(2));
+        if !self.sampler.draw(spent.iterations, order.is_some(), sample) {
             return false;
         }
         spent.iterations += 1;
@@ -380,6 +380,7 @@ fn gate<T: Real>(bound: T, inliers: u32, count: u32, counts: &ScoreCounts) -> Ga
 
 /// The share of inliers that rejected models had so far, within what separates right from wrong; 5 % before enough is
 /// known.
+#[cfg_attr(small, inline(never))]
 fn wrong_share<T: Real>(counts: &ScoreCounts) -> T {
     if counts.rejected_residuals < 500 {
         return lit(0.05);

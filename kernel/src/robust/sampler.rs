@@ -7,7 +7,8 @@ use crate::real::{from_u32, lit};
 const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// A bijection of 64-bit words in which every input bit reaches every output bit (the finaliser of SplitMix64).
-#[inline]
+#[cfg_attr(not(small), inline)]
+#[cfg_attr(small, inline(never))]
 const fn mix(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -92,54 +93,64 @@ impl<T: Real> Sampler<T> {
     #[must_use]
     pub fn sample<const S: usize>(&mut self, iteration: u32) -> Option<[u32; S]> {
         let mut sample = [0; S];
-        self.draw(iteration, &mut sample).then_some(sample)
+        self.draw(iteration, true, &mut sample).then_some(sample)
     }
 
-    /// [`sample`](Self::sample) of any size: false where there is none.
-    pub(super) fn draw(&mut self, iteration: u32, chosen: &mut [u32]) -> bool {
+    /// [`sample`](Self::sample) of any size, of all numbers alike unless `ranked`: false where there is none.
+    #[inline]
+    pub(super) fn draw(&mut self, iteration: u32, ranked: bool, chosen: &mut [u32]) -> bool {
         let size = chosen.len();
         if (self.count as u64) < size as u64 || size == 0 {
             return false;
         }
-        // A sampler ranked for smaller samples has too small a pool for these.
-        if self.growth.as_ref().is_some_and(|growth| (growth.pool as u64) < size as u64) {
-            return false;
-        }
-        let key = mix(self.seed.wrapping_add((iteration as u64).wrapping_mul(STEP)));
-        let mut pool = self.count;
-        let mut newest = None;
-        if let Some(growth) = &mut self.growth {
-            // The pool grows by one where its share of samples is used up; one step an iteration bounds the work,
-            // and only the first few shares are smaller than one sample.
-            if from_u32::<T>(iteration) >= growth.until && growth.pool < self.count {
-                let grown = growth.samples * from_u32::<T>(growth.pool + 1)
-                    / from_u32::<T>(growth.pool + 1 - core::cmp::min(size as u32, growth.pool));
-                growth.until += crate::real::max(grown - growth.samples, T::ONE);
-                growth.samples = grown;
-                growth.pool += 1;
+        let (mut pool, mut newest) = (self.count, None);
+        if ranked && let Some(growth) = &mut self.growth {
+            // A sampler ranked for smaller samples has too small a pool for these.
+            if (growth.pool as u64) < size as u64 {
+                return false;
             }
+            growth.grow(iteration, size, self.count);
             if growth.pool < self.count {
                 pool = growth.pool - 1;
                 newest = Some(pool);
             }
         }
-        chosen.fill(u32::MAX);
-        let draws = size - newest.is_some() as usize;
-        for (k, step) in (0..draws as u32).zip(1u64..) {
-            let word = mix(key.wrapping_add(step.wrapping_mul(STEP)));
-            // A number among those not chosen yet: walk up past the chosen ones, which are in rising order.
-            let mut value = (((word >> 32) * (pool - k) as u64) >> 32) as u32;
-            for &taken in &*chosen {
-                if taken <= value {
-                    value += 1;
-                }
-            }
-            insert(chosen, value);
-        }
-        if let Some(newest) = newest {
-            insert(chosen, newest);
-        }
+        choose(mix(self.seed.wrapping_add((iteration as u64).wrapping_mul(STEP))), pool, newest, chosen);
         true
+    }
+}
+
+impl<T: Real> Growth<T> {
+    /// The pool grows by one where its share of samples is used up; one step an iteration bounds the work, and only the
+    /// first few shares are smaller than one sample.
+    fn grow(&mut self, iteration: u32, size: usize, count: u32) {
+        if from_u32::<T>(iteration) >= self.until && self.pool < count {
+            let grown = self.samples * from_u32::<T>(self.pool + 1)
+                / from_u32::<T>(self.pool + 1 - core::cmp::min(size as u32, self.pool));
+            self.until += crate::real::max(grown - self.samples, T::ONE);
+            self.samples = grown;
+            self.pool += 1;
+        }
+    }
+}
+
+/// Distinct numbers below `pool` in rising order, `newest` among them if there is one.
+#[cfg_attr(small, inline(never))]
+fn choose(key: u64, pool: u32, newest: Option<u32>, chosen: &mut [u32]) {
+    let draws = chosen.len() - newest.is_some() as usize;
+    for (k, step) in (0..draws as u32).zip(1u64..) {
+        let word = mix(key.wrapping_add(step.wrapping_mul(STEP)));
+        // A number among those not chosen yet: walk up past the chosen ones, which are in rising order.
+        let mut value = (((word >> 32) * (pool - k) as u64) >> 32) as u32;
+        for &taken in chosen.iter().take(k as usize) {
+            if taken <= value {
+                value += 1;
+            }
+        }
+        insert(chosen, k as usize, value);
+    }
+    if let Some(newest) = newest {
+        insert(chosen, draws, newest);
     }
 }
 
@@ -147,13 +158,16 @@ fn smallest<const N: usize>(numbers: [u32; N]) -> u32 {
     numbers.into_iter().fold(u32::MAX, core::cmp::min)
 }
 
-/// Puts `value` into a rising list; the last entry falls off.
+/// Puts `value` into a rising list of `count` entries.
 #[inline]
-fn insert(rising: &mut [u32], mut value: u32) {
-    for entry in rising {
+fn insert(rising: &mut [u32], count: usize, mut value: u32) {
+    for entry in rising.iter_mut().take(count) {
         if value < *entry {
             core::mem::swap(entry, &mut value);
         }
+    }
+    if let Some(entry) = rising.get_mut(count) {
+        *entry = value;
     }
 }
 
