@@ -108,12 +108,12 @@ fn sides<T: Real, B: EpipolarBlock<T>>(data: BlockSlice<'_, B>) -> (T, T) {
     let (mut low, mut high) = ([T::MAX; 3], [-T::MAX; 3]);
     let mut left = data.count;
     for block in data.blocks {
-        let (_, f2) = block.directions();
-        for l in 0..LANES {
+        for l in 0..core::cmp::min(left, LANES) {
+            let Some((_, f2)) = block.directions(l) else { break };
             for k in 0..3 {
-                if l < left && f2[k][l] > -T::MAX && f2[k][l] < T::MAX {
-                    low[k] = min(low[k], f2[k][l]);
-                    high[k] = max(high[k], f2[k][l]);
+                if f2[k] > -T::MAX && f2[k] < T::MAX {
+                    low[k] = min(low[k], f2[k]);
+                    high[k] = max(high[k], f2[k]);
                 }
             }
         }

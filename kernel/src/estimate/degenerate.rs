@@ -22,10 +22,8 @@ type Point<T> = [T; 4];
 
 #[cfg_attr(small, inline(never))]
 fn point<T: Real, B: EpipolarBlock<T>>(data: BlockSlice<'_, B>, index: u32) -> Option<Point<T>> {
-    let (plane, _) = data.blocks.get(index as usize / LANES)?.planes();
-    let lane = index as usize % LANES;
-    let at = |k: usize| plane[k].get(lane).copied();
-    Some([at(0)?, at(1)?, at(2)?, at(3)?])
+    let (point, _) = data.blocks.get(index as usize / LANES)?.on_planes(index as usize % LANES)?;
+    Some(point)
 }
 
 /// A line of each view: a point, and the unit normal.
@@ -58,11 +56,11 @@ fn fit<T: Real, B: EpipolarBlock<T>>(
     limit: T,
 ) -> Line<T> {
     let on = |p: &Point<T>| distances_sq(p, line).iter().all(|d| *d < limit);
-    let mut near = inliers.iter().filter_map(|&i| point(data, i)).filter(on);
-    let Some(first) = near.next() else { return *line };
     // Moments about the first point.
-    let (mut n, mut sum, mut square, mut cross) = (T::ONE, [T::ZERO; 4], [T::ZERO; 4], [T::ZERO; 2]);
-    for p in near {
+    let mut first = None;
+    let (mut n, mut sum, mut square, mut cross) = (T::ZERO, [T::ZERO; 4], [T::ZERO; 4], [T::ZERO; 2]);
+    for p in inliers.iter().filter_map(|&i| point(data, i)).filter(on) {
+        let first = first.get_or_insert(p);
         n += T::ONE;
         let d = [p[0] - first[0], p[1] - first[1], p[2] - first[2], p[3] - first[3]];
         for k in 0..4 {
@@ -73,6 +71,7 @@ fn fit<T: Real, B: EpipolarBlock<T>>(
         cross[1] += d[2] * d[3];
     }
     let mut result = *line;
+    let Some(first) = first else { return result };
     for view in 0..2 {
         let (x, y) = (2 * view, 2 * view + 1);
         let (mx, my) = (sum[x] / n, sum[y] / n);
@@ -176,6 +175,7 @@ fn off_line<T: Real, B: EpipolarBlock<T>>(
 
 /// True where the inliers are repetitions of fewer than `needed` distinct points but for as few as chance explains. One
 /// function for all lists.
+#[cfg_attr(small, inline(never))]
 pub(super) fn few_distinct<T: Real, B: EpipolarBlock<T>>(
     data: BlockSlice<'_, B>,
     inliers: &mut dyn Iterator<Item = u32>,

@@ -38,8 +38,7 @@ impl<T: Real> Scatter<T> {
         let mut result = Self { weights: T::ZERO, squares: T::ZERO, slopes: T::ZERO, count: 0 };
         let mut left = data.count;
         for block in data.blocks {
-            let (plane, weight) = block.planes();
-            for (l, squared) in transfer_sq(&model.0, &plane, &weight).into_iter().enumerate().take(LANES) {
+            for (l, squared) in transfer_sq(&model.0, block, T::ONE).into_iter().enumerate().take(LANES) {
                 let u = squared * inverse;
                 if l < left && u < T::ONE {
                     let v = T::ONE - u;

@@ -33,10 +33,9 @@ impl<T: Real, B: EpipolarBlock<T>> TransferProblem<'_, T, B> {
             Some(subset) => *subset.get(index as usize)?,
             None => index,
         };
-        let (plane, _) = self.data.blocks.get(index as usize / LANES)?.planes();
-        let lane = index as usize % LANES;
-        let at = |k: usize| plane[k].get(lane).copied();
-        Some((Vector3::new(at(0)?, at(1)?, T::ONE), Vector3::new(at(2)?, at(3)?, T::ONE)))
+        let block = self.data.blocks.get(index as usize / LANES)?;
+        let ([x1, y1, x2, y2], _) = block.on_planes(index as usize % LANES)?;
+        Some((Vector3::new(x1, y1, T::ONE), Vector3::new(x2, y2, T::ONE)))
     }
 
     /// The model that minimises a loss, from `model`.
@@ -90,9 +89,7 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 4> for TransferProblem<'_, T, B>
         let mut seen = 0u32;
         for k in 0..blocks.len() {
             if let Some(block) = blocks.get(at) {
-                let (plane, mut weight) = block.planes();
-                weight.iter_mut().for_each(|w| *w *= scale);
-                let squared = transfer_sq(&model.0, &plane, &weight);
+                let squared = transfer_sq(&model.0, block, scale);
                 let filled = self.data.count.saturating_sub(at * LANES);
                 if filled >= LANES {
                     tally.add(&squared);

@@ -7,6 +7,7 @@
 use nalgebra::Matrix3;
 
 use crate::Real;
+use crate::linalg::vec3::dot;
 use crate::linalg::{LANES, Lanes};
 
 /// Some numbers of each of four correspondences, side by side.
@@ -93,15 +94,15 @@ pub(crate) trait EpipolarBlock<T: Real>: Block<T> {
     /// The same with what derivatives of the residual need.
     fn in_frame(&self, frame: &Frame<T>, lane: usize) -> InFrame<T>;
 
-    /// The points on the plane z = 1, and by how much squared distances there are to be multiplied: 1 on a plane; for
-    /// bearings what makes distances angles, NaN where a bearing does not meet the plane.
-    fn planes(&self) -> (PlaneBlock<T>, Lanes<T>);
+    /// The points of a lane, if there is one, on the plane z = 1 (x1, y1, x2, y2), and by how much squared distances there are
+    /// to be multiplied: 1 on a plane; for bearings what makes distances angles, NaN where one does not meet the plane.
+    fn on_planes(&self, lane: usize) -> Option<([T; 4], T)>;
 
     /// View 1 of these correspondences with view 2 of others: wrong correspondences.
     fn mispaired(&self, other: &Self) -> Self;
 
-    /// The homogeneous points or bearings, component by component.
-    fn directions(&self) -> ([Lanes<T>; 3], [Lanes<T>; 3]);
+    /// The homogeneous points or bearings of a lane, if there is one.
+    fn directions(&self, lane: usize) -> Option<([T; 3], [T; 3])>;
 }
 
 /// Two views as a frame sees them in which the translation is the third axis: then `c = y x x` has two terms only.
@@ -244,20 +245,16 @@ impl<T: Real> EpipolarBlock<T> for PlaneBlock<T> {
     }
 
     #[cfg_attr(not(small), inline(always))]
-    fn planes(&self) -> (PlaneBlock<T>, Lanes<T>) {
-        (*self, [T::ONE; LANES])
+    fn on_planes(&self, lane: usize) -> Option<([T; 4], T)> {
+        let at = |k: usize| self[k].get(lane).copied();
+        Some(([at(0)?, at(1)?, at(2)?, at(3)?], T::ONE))
     }
 
     #[cfg_attr(not(small), inline(always))]
-    fn directions(&self) -> ([Lanes<T>; 3], [Lanes<T>; 3]) {
-        let one = [T::ONE; LANES];
-        ([self[0], self[1], one], [self[2], self[3], one])
+    fn directions(&self, lane: usize) -> Option<([T; 3], [T; 3])> {
+        let at = |k: usize| self[k].get(lane).copied();
+        Some(([at(0)?, at(1)?, T::ONE], [at(2)?, at(3)?, T::ONE]))
     }
-}
-
-#[cfg_attr(not(small), inline(always))]
-fn dot<T: Real>(a: &[T; 3], b: &[T; 3]) -> T {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// `(f1, f2, l1 = F' f2, l2 = F f1)` of a lane. Inlined, so that the lane is known to be one.
@@ -360,24 +357,19 @@ impl<T: Real> EpipolarBlock<T> for BearingBlock<T> {
     }
 
     #[cfg_attr(not(small), inline(always))]
-    fn planes(&self) -> (PlaneBlock<T>, Lanes<T>) {
-        let (mut plane, mut weight) = ([[T::ZERO; LANES]; 4], [T::ONE; LANES]);
-        for l in 0..LANES {
-            let (a, b) = (T::ONE / self[2][l], T::ONE / self[5][l]);
-            plane[0][l] = self[0][l] * a;
-            plane[1][l] = self[1][l] * a;
-            plane[2][l] = self[3][l] * b;
-            plane[3][l] = self[4][l] * b;
-            // A distance on the plane is an angle over cos^2 along the radius: the product of both views' cosines.
-            let cosines = self[2][l] * self[5][l];
-            let ahead = self[2][l] > T::ZERO && self[5][l] > T::ZERO;
-            weight[l] = if ahead { cosines * cosines } else { crate::real::lit(f64::NAN) };
-        }
-        (plane, weight)
+    fn on_planes(&self, lane: usize) -> Option<([T; 4], T)> {
+        let ([x1, y1, z1], [x2, y2, z2]) = self.directions(lane)?;
+        let (a, b) = (T::ONE / z1, T::ONE / z2);
+        // A distance on the plane is an angle over cos^2 along the radius: the product of both views' cosines.
+        let cosines = z1 * z2;
+        let ahead = z1 > T::ZERO && z2 > T::ZERO;
+        let weight = if ahead { cosines * cosines } else { crate::real::lit(f64::NAN) };
+        Some(([x1 * a, y1 * a, x2 * b, y2 * b], weight))
     }
 
     #[cfg_attr(not(small), inline(always))]
-    fn directions(&self) -> ([Lanes<T>; 3], [Lanes<T>; 3]) {
-        ([self[0], self[1], self[2]], [self[3], self[4], self[5]])
+    fn directions(&self, lane: usize) -> Option<([T; 3], [T; 3])> {
+        let at = |k: usize| self[k].get(lane).copied();
+        Some(([at(0)?, at(1)?, at(2)?], [at(3)?, at(4)?, at(5)?]))
     }
 }

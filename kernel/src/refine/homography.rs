@@ -9,7 +9,7 @@ use super::blocks::{Block, BlockSlice, EpipolarBlock, PlaneBlock};
 use super::lm::{Manifold, NormalEquations, Tangents};
 use super::relative_pose::{Scales, cayley};
 use crate::Real;
-use crate::linalg::{LANES, Lanes, product};
+use crate::linalg::{LANES, Lanes, cross, product};
 use crate::real::{abs, from_u32, sqrt};
 use crate::robust::loss::Loss;
 
@@ -49,13 +49,15 @@ impl<T: Real> Transfer<T> {
     }
 }
 
-/// Squared transfer errors of a block; `T::MAX` where the transferred point is not in front of view 2 or not a number.
+/// Squared transfer errors of a block times `scale`; `T::MAX` where the transferred point is not in front of view 2 or not a
+/// number.
 #[cfg_attr(not(small), inline(always))]
-pub(crate) fn transfer_sq<T: Real>(h: &Matrix3<T>, block: &PlaneBlock<T>, weight: &Lanes<T>) -> Lanes<T> {
+pub(crate) fn transfer_sq<T: Real, B: EpipolarBlock<T>>(h: &Matrix3<T>, block: &B, scale: T) -> Lanes<T> {
     let mut squared = [T::MAX; LANES];
     for l in 0..LANES {
-        let t = Transfer::new(h, block[0][l], block[1][l], block[2][l], block[3][l]);
-        let s = t.squared * weight[l];
+        let Some(([x1, y1, x2, y2], weight)) = block.on_planes(l) else { break };
+        let t = Transfer::new(h, x1, y1, x2, y2);
+        let s = t.squared * (weight * scale);
         squared[l] = if t.inverse_z > T::ZERO && s <= T::MAX { s } else { T::MAX };
     }
     squared
@@ -165,13 +167,15 @@ fn entry_equations<T: Real, B: EpipolarBlock<T>>(
     let mut filled = 0usize;
     let mut left = data.count;
     for block in data.blocks {
-        let (plane, weights) = block.planes();
-        let squared = transfer_sq(h, &plane, &weights);
+        let squared = transfer_sq(h, block, T::ONE);
         for l in 0..LANES {
-            if l < left && squared[l] < support {
-                pending.set_lane(filled, &plane, l);
-                if let Some(weight) = pending_weights.get_mut(filled) {
-                    *weight = weights[l];
+            if l < left
+                && squared[l] < support
+                && let Some((points, weight)) = block.on_planes(l)
+            {
+                pending.write_lane(filled, &points);
+                if let Some(place) = pending_weights.get_mut(filled) {
+                    *place = weight;
                 }
                 filled += 1;
                 active += 1;
@@ -234,7 +238,8 @@ fn along_tangents<T: Real>(
     hessian: &mut [T],
     gradient: &mut [T],
 ) {
-    let products = symmetric(entries.products.map(symmetric));
+    let blocks = entries.products.map(symmetric);
+    let products = symmetric(blocks.each_ref());
     for (q, (tangent, slope)) in tangents.iter().zip(gradient).enumerate() {
         let mut image = [T::ZERO; 9];
         for i in 0..3 {
@@ -274,13 +279,12 @@ impl<T: Real> HomographyModel<T> {
         if !(size > T::ZERO && size <= T::MAX) {
             return None;
         }
-        let h = h * (T::ONE / size);
+        let mut h = h * (T::ONE / size);
         let determinant = h.determinant();
-        if abs(determinant) > T::EPSILON {
-            Some(Self(h * if determinant < T::ZERO { -T::ONE } else { T::ONE }))
-        } else {
-            None
+        if determinant < T::ZERO {
+            h *= -T::ONE;
         }
+        (abs(determinant) > T::EPSILON).then_some(Self(h))
     }
 }
 
@@ -349,12 +353,7 @@ impl<T: Real> Tangents<T, 3> for RotationModel<T> {
         let mut result = [[T::ZERO; 9]; 3];
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
         for (tangent, axis) in result.iter_mut().zip(axes) {
-            let mut m = self.rotation;
-            for column in &mut m.data.0 {
-                let turned = axis.cross(&Vector3::new(column[0], column[1], column[2]));
-                *column = [turned.x, turned.y, turned.z];
-            }
-            let m = self.scales.transfer(&m);
+            let m = self.scales.transfer(&cross(&axis, &self.rotation));
             for i in 0..3 {
                 for j in 0..3 {
                     tangent[3 * i + j] = m.data.0[j][i];

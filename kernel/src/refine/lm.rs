@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, SMatrix, SVector};
 
 use super::blocks::{BlockSlice, EpipolarBlock};
 use crate::Real;
-use crate::linalg::{LANES, Lanes, Ldlt};
+use crate::linalg::{LANES, Lanes, damped_step};
 use crate::real::{from_u32, lit};
 use crate::robust::loss::Loss;
 
@@ -71,20 +71,7 @@ impl<T: Real, const P: usize> NormalEquations<T, P> {
     /// the cost; none where a direction is open. Called where code is to be small: its factors take no stack during a pass.
     #[cfg_attr(small, inline(never))]
     pub(crate) fn step(&self, damping: T) -> Option<(SVector<T, P>, T)> {
-        let mut damped = self.hessian;
-        for p in 0..P {
-            let diagonal = damped.data.0[p][p];
-            damped.data.0[p][p] = diagonal + damping * diagonal;
-        }
-        // Not moved out of the option: factors are large.
-        let factors = Ldlt::new(&damped);
-        let mut step = factors.as_ref()?.solve(&self.gradient);
-        let mut promise = T::ZERO;
-        for (x, g) in step.data.0[0].iter_mut().zip(&self.gradient.data.0[0]) {
-            promise += *x * *g;
-            *x = -*x;
-        }
-        Some((step, promise))
+        damped_step(&self.hessian, &self.gradient, damping)
     }
 
     /// Adds those of other correspondences.

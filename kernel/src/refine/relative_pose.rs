@@ -1,6 +1,6 @@
 //! A relative pose as the model of refinement: rotation and direction of translation, five degrees of freedom.
 
-use nalgebra::{Matrix3, SVector, Vector3};
+use nalgebra::{ArrayStorage, Matrix3, SVector, Vector3};
 
 use super::blocks::{EpipolarBlock, Frame, InFrame, Sight};
 use super::lm::{EpipolarModel, Manifold, NormalEquations, Row};
@@ -8,6 +8,7 @@ use crate::Real;
 use crate::geometry::Pose;
 use crate::geometry::pose::{from_parts, tangent_basis};
 use crate::linalg::product;
+use crate::linalg::vec3::{cross, dot, scaled};
 use crate::real::sqrt;
 
 /// A rotation, a unit translation, and the scales between normalised coordinates and the blocks' coordinates.
@@ -44,33 +45,18 @@ impl<T: Real> Scales<T> {
     #[cfg_attr(not(small), inline)]
     #[cfg_attr(small, inline(never))]
     fn apply(&self, e: &Matrix3<T>) -> Matrix3<T> {
-        let (a, b) = (self.inverse1(), self.inverse2());
-        let m = &e.data.0;
-        let column = |j: usize, s: T| [m[j][0] * b[0] * s, m[j][1] * b[1] * s, m[j][2] * s];
-        let mut result = *e;
-        result.data.0 = [column(0, a[0]), column(1, a[1]), column(2, T::ONE)];
-        result
+        between(e, self.inverse2(), self.inverse1())
     }
 
     /// `D2 H D1^-1`: a homography between normalised coordinates, for those of the blocks.
     #[cfg_attr(small, inline(never))]
     pub(crate) fn transfer(&self, h: &Matrix3<T>) -> Matrix3<T> {
-        let (a, b) = (self.inverse1(), self.view2);
-        let m = &h.data.0;
-        let column = |j: usize, s: T| [m[j][0] * b[0] * s, m[j][1] * b[1] * s, m[j][2] * s];
-        let mut result = *h;
-        result.data.0 = [column(0, a[0]), column(1, a[1]), column(2, T::ONE)];
-        result
+        between(h, self.view2, self.inverse1())
     }
 
     /// `D2^-1 H D1`: the inverse of [`Scales::transfer`].
     pub(crate) fn transfer_back(&self, h: &Matrix3<T>) -> Matrix3<T> {
-        let (a, b) = (self.view1, self.inverse2());
-        let m = &h.data.0;
-        let column = |j: usize, s: T| [m[j][0] * b[0] * s, m[j][1] * b[1] * s, m[j][2] * s];
-        let mut result = *h;
-        result.data.0 = [column(0, a[0]), column(1, a[1]), column(2, T::ONE)];
-        result
+        between(h, self.inverse2(), self.view1)
     }
 
     /// Normalised coordinates over those of the blocks, view 1.
@@ -88,13 +74,22 @@ impl<T: Real> Scales<T> {
     }
 }
 
+/// `diag(b, 1) M diag(a, 1)`
+#[cfg_attr(not(small), inline(always))]
+#[cfg_attr(small, inline(never))]
+fn between<T: Real>(m: &Matrix3<T>, b: [T; 2], a: [T; 2]) -> Matrix3<T> {
+    let m = &m.data.0;
+    let column = |j: usize, s: T| [m[j][0] * b[0] * s, m[j][1] * b[1] * s, m[j][2] * s];
+    Matrix3::from_data(ArrayStorage([column(0, a[0]), column(1, a[1]), column(2, T::ONE)]))
+}
+
 /// A rotation near `Exp(w)`: exact as a rotation, equal to the exponential to second order (Cayley's map of w / 2).
 #[cfg_attr(not(small), inline)]
 #[cfg_attr(small, inline(never))]
 pub(crate) fn cayley<T: Real>(w: &Vector3<T>) -> Matrix3<T> {
-    let h = w * T::HALF;
-    let s = T::TWO / (T::ONE + h.norm_squared());
-    let (x, y, z) = (h.x, h.y, h.z);
+    let h = scaled(&w.data.0[0], T::HALF);
+    let s = T::TWO / (T::ONE + dot(&h, &h));
+    let [x, y, z] = h;
     let one = T::ONE;
     Matrix3::new(
         one - s * (y * y + z * z),
@@ -116,6 +111,13 @@ impl<T: Real> PoseModel<T> {
         from_parts(&self.rotation, &self.translation)
     }
 
+    /// Squared distance of the rotation (the angle's square, of a small angle) and of the translation.
+    #[cfg_attr(small, inline(never))]
+    pub(crate) fn distance_sq(&self, other: &Self) -> T {
+        let turn = (self.rotation - other.rotation).norm_squared() * T::HALF;
+        turn + (self.translation - other.translation).norm_squared()
+    }
+
     /// `E = [t]x R`, column by column.
     #[inline]
     fn essential(&self) -> Matrix3<T> {
@@ -126,11 +128,6 @@ impl<T: Real> PoseModel<T> {
         }
         e
     }
-}
-
-#[cfg_attr(not(small), inline(always))]
-fn cross<T: Real>(a: &[T; 3], b: &[T; 3]) -> [T; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// The axes of a frame along the translation, and the views in it.
@@ -148,15 +145,17 @@ impl<T: Real> Manifold<T, 5> for PoseModel<T> {
         self.scales.apply(&self.essential())
     }
 
-    #[inline]
+    #[cfg_attr(not(small), inline)]
+    #[cfg_attr(small, inline(never))]
     fn retract(&self, step: &SVector<T, 5>) -> Self {
         let s = &step.data.0[0];
         let basis = tangent_basis(&self.translation);
-        let [u, v] = basis.data.0.map(Vector3::from);
-        let t = self.translation + u * s[3] + v * s[4];
+        let ([u, v], t) = (&basis.data.0, &self.translation.data.0[0]);
+        let at = |k: usize| t[k] + u[k] * s[3] + v[k] * s[4];
+        let t = [at(0), at(1), at(2)];
         Self {
             rotation: product(&cayley(&Vector3::new(s[0], s[1], s[2])), &self.rotation),
-            translation: t * (T::ONE / sqrt(t.norm_squared())),
+            translation: scaled(&t, T::ONE / sqrt(dot(&t, &t))).into(),
             scales: self.scales,
         }
     }
@@ -166,8 +165,8 @@ impl<T: Real> EpipolarModel<T, 5> for PoseModel<T> {
     type Frame = PoseFrame<T>;
 
     fn frame(&self) -> PoseFrame<T> {
-        let [u, v] = tangent_basis(&self.translation).data.0.map(Vector3::from);
-        let axes = Matrix3::from_columns(&[u, v, self.translation]);
+        let [u, v] = tangent_basis(&self.translation).data.0;
+        let axes = Matrix3::from_data(ArrayStorage([u, v, self.translation.data.0[0]]));
         let (s1, s2) = (self.scales.inverse1(), self.scales.inverse2());
         let (mut view1, mut view2) = (product(&axes.transpose(), &self.rotation), axes);
         for i in 0..3 {

@@ -8,7 +8,6 @@ use crate::estimate::chance::{EXPLAINED_SIGMAS, beyond_chance, line_accident, me
 use crate::estimate::degenerate::{few_distinct, few_repeated, list, mostly_on_a_line, on_a_line};
 use crate::estimate::frame::PixelFrame;
 use crate::estimate::transfer::TransferProblem;
-use crate::linalg::LANES;
 use crate::real::{from_u32, lit, max, sqrt};
 use crate::refine::fundamental::FundamentalModel;
 use crate::refine::homography::{HomographyModel, transfer_sq};
@@ -176,7 +175,7 @@ impl<T: Real> Judge<'_, '_, T> {
         let mut free = order.iter_mut();
         let mut split = Split { on: 0, off: 0, outside: 0 };
         for block in self.problem.data.blocks {
-            let squared = transfer_sq(&plane.0, block, &[T::ONE; LANES]);
+            let squared = transfer_sq(&plane.0, block, T::ONE);
             for (&s, (&inlier, index)) in squared.iter().zip(entries.by_ref()) {
                 if s < limit {
                     split.on += inlier as u32;
@@ -195,7 +194,7 @@ impl<T: Real> Judge<'_, '_, T> {
         let limit = sigma * sigma * lit(EXPLAINED_SIGMAS * EXPLAINED_SIGMAS);
         let mut entries = mask.iter_mut();
         for block in self.problem.data.blocks {
-            let squared = transfer_sq(&plane.0, block, &[T::ONE; LANES]);
+            let squared = transfer_sq(&plane.0, block, T::ONE);
             for (&s, inlier) in squared.iter().zip(entries.by_ref()) {
                 *inlier = s < limit;
             }

@@ -14,7 +14,7 @@ use super::workspace::{TwoViewStorage, TwoViewWorkspace};
 use crate::Real;
 use crate::linalg::LANES;
 use crate::real::{lit, max, min, sqrt};
-use crate::refine::blocks::{Block, BlockSlice, EpipolarBlock, PlaneBlock};
+use crate::refine::blocks::{Block, BlockSlice, PlaneBlock};
 use crate::refine::homography::{HomographyModel, transfer_sq};
 use crate::robust::budget::check_noise;
 use crate::robust::loss::Loss;
@@ -278,9 +278,8 @@ impl<T: Real> Judge<'_, '_, T> {
         let indices = list(mask, order);
         // A homography through repeated points agrees with any pairing of them.
         let scale = T::ONE / (problem.threshold * problem.threshold);
-        let mispaired = measured_accident(data, accident, |block: &PlaneBlock<T>| {
-            transfer_sq(&model.0, block, &[scale; LANES])
-        });
+        let mispaired =
+            measured_accident(data, accident, |block: &PlaneBlock<T>| transfer_sq(&model.0, block, scale));
         if few_distinct(data, &mut indices.iter().copied(), 4, sigma, &|| mispaired) {
             return (HomographyVerdict::Unobservable(Unobservable::TooFewDistinct), noise);
         }
@@ -310,8 +309,7 @@ impl<T: Real> Judge<'_, '_, T> {
         let mut entries = mask.iter_mut();
         let mut inliers = 0;
         for block in self.problem.data.blocks {
-            let (plane, weight) = block.planes();
-            for (&s, inlier) in transfer_sq(&model.0, &plane, &weight).iter().zip(entries.by_ref()) {
+            for (&s, inlier) in transfer_sq(&model.0, block, T::ONE).iter().zip(entries.by_ref()) {
                 *inlier = s < limit;
                 inliers += *inlier as u32;
             }

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 use super::super::scatter::student;
 use crate::Real;
 use crate::geometry::pose::tangent_basis;
-use crate::linalg::{Ldlt, add_outer, cross};
+use crate::linalg::{add_outer, cross, scaled_inverse};
 use crate::real::{from_u32, lit, max, sqrt};
 use crate::refine::homography::HomographyModel;
 use crate::refine::lm::{NormalEquations, Tangents};
@@ -22,7 +22,7 @@ pub(super) fn covariance<T: Real, const P: usize>(
 /// `variance A^-1`; none where A is singular.
 #[cfg_attr(small, inline(never))]
 fn inverse<T: Real, const P: usize>(a: &SMatrix<T, P, P>, variance: T) -> Option<SMatrix<T, P, P>> {
-    Ldlt::new(a).map(|factors| factors.inverse() * variance)
+    scaled_inverse(a, variance)
 }
 
 /// Sums over residuals within the support of Tukey's loss: of `r psi`, of `psi^2` and of `psi'`, in units of the support.

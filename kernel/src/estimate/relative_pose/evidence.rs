@@ -75,9 +75,7 @@ impl<T: Real, B: EpipolarBlock<T>> Evidence<'_, '_, T, B> {
         let mut result = Explained { all: 0, inliers: 0, others: 0, squares: T::ZERO, across: T::ZERO };
         let mut mask = self.inliers.iter();
         for block in self.problem.data.blocks {
-            let (plane, mut weight) = block.planes();
-            weight.iter_mut().for_each(|w| *w *= scale);
-            let squared = transfer_sq(h, &plane, &weight);
+            let squared = transfer_sq(h, block, scale);
             let (c, d) = block.residual(&self.epipolar);
             for (l, &inlier) in (0..LANES).zip(mask.by_ref()) {
                 let explained = squared[l] < limit;
@@ -130,9 +128,7 @@ impl<T: Real, B: EpipolarBlock<T>> Evidence<'_, '_, T, B> {
         let (mut cc, mut ee, mut ce, mut n) = (T::ZERO, T::ZERO, T::ZERO, T::ZERO);
         let mut mask = self.inliers.iter();
         for block in self.problem.data.blocks {
-            let (plane, mut weight) = block.planes();
-            weight.iter_mut().for_each(|w| *w *= scale);
-            let squared = transfer_sq(h, &plane, &weight);
+            let squared = transfer_sq(h, block, scale);
             let ((c, d), (e, f)) = (block.residual(&self.epipolar), block.residual(pose));
             for (l, _) in (0..LANES).zip(mask.by_ref()) {
                 if squared[l] < limit {

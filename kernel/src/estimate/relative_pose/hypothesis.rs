@@ -5,7 +5,8 @@ use nalgebra::{Matrix3, Vector3};
 use crate::Real;
 use crate::geometry::Essential;
 use crate::geometry::pose::nearest_rotation;
-use crate::linalg::{LANES, Lanes, add_outer, cross, times};
+use crate::linalg::vec3::{cross, dot};
+use crate::linalg::{LANES, Lanes, add_outer, times};
 use crate::real::{abs, from_u32, lit, sqrt};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock};
 use crate::refine::homography::{RotationModel, transfer_sq};
@@ -72,13 +73,10 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
     #[inline]
     pub(super) fn directions(&self, index: u32) -> Option<(Vector3<T>, Vector3<T>)> {
         let block = self.data.blocks.get(index as usize / LANES)?;
-        let (f1, f2) = block.directions();
-        let lane = index as usize % LANES;
+        let (f1, f2) = block.directions(index as usize % LANES)?;
         let (a, b) = (self.scales.inverse1(), self.scales.inverse2());
-        let pick = |f: &[Lanes<T>; 3], s: [T; 2]| {
-            Some(Vector3::new(*f[0].get(lane)? * s[0], *f[1].get(lane)? * s[1], *f[2].get(lane)?))
-        };
-        Some((pick(&f1, a)?, pick(&f2, b)?))
+        let scaled = |f: [T; 3], s: [T; 2]| Vector3::new(f[0] * s[0], f[1] * s[1], f[2]);
+        Some((scaled(f1, a), scaled(f2, b)))
     }
 
     /// Squared residuals of a block in units of the squared threshold; of a point behind a camera, the largest number.
@@ -161,11 +159,12 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
             let limit = from_u32::<T>(factor) * sigma;
             let mut moment = Matrix3::zeros();
             let turned = self.turned(sample, &model, limit * limit, |block, turned| {
-                let (f1, f2) = block.directions();
                 for l in 0..LANES {
-                    if turned[l] {
-                        let v1 = Vector3::new(f1[0][l] * s1[0], f1[1][l] * s1[1], f1[2][l]);
-                        let v2 = Vector3::new(f2[0][l] * s2[0], f2[1][l] * s2[1], f2[2][l]);
+                    if turned[l]
+                        && let Some((f1, f2)) = block.directions(l)
+                    {
+                        let v1 = Vector3::new(f1[0] * s1[0], f1[1] * s1[1], f1[2]);
+                        let v2 = Vector3::new(f2[0] * s2[0], f2[1] * s2[1], f2[2]);
                         add_outer(&mut moment, &v2, &v1, T::ONE);
                     }
                 }
@@ -210,8 +209,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         // At least one already, which the optimiser does not see through memory.
         let every = core::cmp::max(sample.every, 1);
         for (block, lanes) in self.data.blocks.iter().step_by(every).zip(&sample.lanes) {
-            let (plane, weight) = block.planes();
-            let squared = transfer_sq(&h, &plane, &weight);
+            let squared = transfer_sq(&h, block, T::ONE);
             let mut explained = [false; LANES];
             for l in 0..LANES {
                 explained[l] = lanes[l] && squared[l] < limit;
@@ -437,28 +435,33 @@ fn pose_in_front<T: Real>(
     f2: &[Vector3<T>; 5],
     parallel_sq: T,
 ) -> Option<(Matrix3<T>, Vector3<T>)> {
-    let e = &essential.0;
-    let columns = e.data.0.map(Vector3::from);
-    let products =
-        [columns[1].cross(&columns[2]), columns[2].cross(&columns[0]), columns[0].cross(&columns[1])];
+    let e = &essential.0.data.0;
+    let products = [cross(&e[1], &e[2]), cross(&e[2], &e[0]), cross(&e[0], &e[1])];
     // t is orthogonal to every column: the longest of their cross products.
-    let lengths = products.map(|p| p.norm_squared());
-    let (mut t, mut longest) = (products[0], lengths[0]);
-    for k in 1..3 {
-        if lengths[k] > longest {
-            (t, longest) = (products[k], lengths[k]);
+    let (mut t, mut longest) = (products[0], T::ZERO);
+    for product in products {
+        let length = dot(&product, &product);
+        if length > longest {
+            (t, longest) = (product, length);
         }
     }
-    let size = e.norm_squared() * T::HALF;
+    let size = essential.0.norm_squared() * T::HALF;
     if !(longest > T::ZERO && size > T::ZERO) {
         return None;
     }
-    t *= T::ONE / sqrt(longest);
+    let scale = T::ONE / sqrt(longest);
+    let t = [t[0] * scale, t[1] * scale, t[2] * scale];
     // With |t| = 1 and E scaled to |E|^2 = 2: R = cof(E) - [t]x E, or with -t.
     let scale = T::ONE / sqrt(size);
-    let cofactors = Matrix3::from_columns(&products) * (scale * scale);
-    let turned = cross(&t, e) * scale;
-    for rotation in [cofactors - turned, cofactors + turned] {
+    let turned = e.map(|column| cross(&t, &column));
+    let t = Vector3::from(t);
+    for side in [-scale, scale] {
+        let mut rotation = essential.0;
+        for j in 0..3 {
+            for i in 0..3 {
+                rotation.data.0[j][i] = products[j][i] * (scale * scale) + turned[j][i] * side;
+            }
+        }
         let mut sign = T::ZERO;
         let mut consistent = true;
         for (x1, x2) in f1.iter().zip(f2) {

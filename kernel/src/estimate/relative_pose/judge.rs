@@ -226,7 +226,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                 let twins = self.twins(&plane);
                 let mut least = self.cost(&refined.model);
                 let pose = refined.model;
-                let leads_back = |twin: &PoseModel<T>| apart_sq(twin, &pose) < lit(SAME_POSE_SQ);
+                let leads_back = |twin: &PoseModel<T>| twin.distance_sq(&pose) < lit(SAME_POSE_SQ);
                 let mut moved = false;
                 // What a free pose gains of the noise grows with its square.
                 let louder = sigma / self.sigma;
@@ -258,7 +258,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                     if self.cost(&near) < least + chance {
                         let other = self.refine(&near, REFINE_PASSES);
                         let cost = self.cost(&other.model);
-                        let differs = apart_sq(&other.model, &refined.model) > lit(OTHER_POSE_SQ);
+                        let differs = other.model.distance_sq(&refined.model) > lit(OTHER_POSE_SQ);
                         tied = (tied || (differs && cost < least + chance)) && cost + chance > least;
                         if cost < least {
                             (refined, least, moved) = (other, cost, true);
@@ -386,11 +386,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
 
     /// The noise about a pose, from what lies within two thresholds, and how many do.
     fn spread(&self, model: &PoseModel<T>) -> Spread<T> {
-        let mut sums = PsiSums::default();
-        self.problem.for_each_block(model, |_, squared, filled| {
-            squared.iter().take(filled).for_each(|&s| sums.add(s * lit(0.25)));
-        });
-        sums.spread(self.problem.threshold * T::TWO, 5)
+        self.survey(model, self.problem.threshold * T::TWO, &mut []).1
     }
 
     pub(super) fn cost(&self, model: &PoseModel<T>) -> T {
@@ -403,18 +399,27 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
 
     /// Writes the pose's inliers; how many they are, and what the residuals say about the noise.
     fn mark(&self, refined: &Refined<T>, mask: &mut [bool]) -> (u32, Spread<T>) {
-        let share = self.problem.threshold / refined.support;
+        self.survey(&refined.model, refined.support, mask)
+    }
+
+    /// How many inliers a pose has, what the residuals up to a support say about the noise, and the inliers, as far as there
+    /// is a mask.
+    fn survey(&self, model: &PoseModel<T>, support: T, mask: &mut [bool]) -> (u32, Spread<T>) {
+        let share = self.problem.threshold / support;
         let scale = share * share;
         let mut entries = mask.iter_mut();
         let (mut inliers, mut sums) = (0, PsiSums::default());
-        self.problem.for_each_block(&refined.model, |_, squared, filled| {
-            for (inlier, &s) in entries.by_ref().take(filled).zip(squared) {
-                *inlier = s < T::ONE;
-                inliers += *inlier as u32;
+        self.problem.for_each_block(model, |_, squared, filled| {
+            for &s in squared.iter().take(filled) {
+                let inside = s < T::ONE;
+                if let Some(inlier) = entries.next() {
+                    *inlier = inside;
+                }
+                inliers += inside as u32;
                 sums.add(s * scale);
             }
         });
-        (inliers, sums.spread(refined.support, 5))
+        (inliers, sums.spread(support, 5))
     }
 
     /// Writes the inliers of `x2 ~ H x1`.
@@ -423,8 +428,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         let limit = limit * limit;
         let mut entries = mask.iter_mut();
         for block in self.problem.data.blocks {
-            let (plane, weight) = block.planes();
-            let squared = transfer_sq(h, &plane, &weight);
+            let squared = transfer_sq(h, block, T::ONE);
             for (&s, inlier) in squared.iter().take(LANES).zip(entries.by_ref()) {
                 *inlier = s < limit;
             }
@@ -442,9 +446,4 @@ pub(super) fn pose_model<T: Real, B>(pose: &Pose<T>, problem: &PoseProblem<'_, T
         translation: pose.translation.vector,
         scales: problem.scales,
     }
-}
-
-/// The squared distance of two poses: of rotations by radians, of directions of translation.
-fn apart_sq<T: Real>(a: &PoseModel<T>, b: &PoseModel<T>) -> T {
-    (a.rotation - b.rotation).norm_squared() * T::HALF + (a.translation - b.translation).norm_squared()
 }

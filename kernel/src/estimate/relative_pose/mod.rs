@@ -12,7 +12,7 @@ use crate::real::is_finite;
 use crate::real::lit;
 use crate::refine::blocks::{BearingBlock, BlockSlice, EpipolarBlock, PlaneBlock};
 use crate::robust::budget::check_noise;
-use crate::robust::{Guide, RansacOptions, RansacReport, ransac};
+use crate::robust::{Guide, Progress, RansacOptions, RansacReport, ransac};
 use crate::{InputError, Real};
 
 mod aided;
@@ -430,21 +430,41 @@ fn estimate<T: Real, B: EpipolarBlock<T>>(
 ) {
     match known {
         Some(known) => {
-            judged::<T, B>(units, sigma_px, options, workspace, found, |judge, mask, order, found| {
-                aided::judge(judge, &known, &options.ransac, guide, mask, order, found);
-            })
+            let search =
+                |judge: &Judge<'_, '_, T, B>, _, mask: &mut [bool], order: &mut [u32], found: &mut _| {
+                    aided::judge(judge, &known, &options.ransac, guide, mask, order, found);
+                };
+            judged(units, sigma_px, options, false, workspace, found, search);
         }
-        None => judged::<T, B>(units, sigma_px, options, workspace, found, |judge, mask, order, found| {
-            let ranked = ranked(guide.scores, order, mask.len());
-            let mut keep_going = guide.keep_going;
-            let ask = keep_going.as_mut().map(|ask| &mut **ask as &mut dyn FnMut(&_) -> bool);
-            let consensus = ransac::<T, _, 5>(judge.problem, &options.ransac, ranked, LEAST_INLIERS, ask);
-            found.report = consensus.report;
-            let budget = options.ransac.budget.less(&consensus.report.spent);
-            let searched = consensus.report.spent.iterations;
-            judge.judge(&consensus, &mut Left { searched, budget, keep_going }, mask, order, found);
-        }),
+        None => {
+            // Here, where the compiler sees whether there are scores.
+            let ranked = ranked(guide.scores, workspace.order, workspace.count).is_some();
+            let search =
+                |judge: &Judge<'_, '_, T, B>, ranked, mask: &mut [bool], order: &mut [u32], found: &mut _| {
+                    plain(judge, &options.ransac, ranked, guide.keep_going, mask, order, found);
+                };
+            judged(units, sigma_px, options, ranked, workspace, found, search);
+        }
     }
+}
+
+/// The search without a prior, ranked by the order if that is one, and its verdict.
+fn plain<T: Real, B: EpipolarBlock<T>>(
+    judge: &Judge<'_, '_, T, B>,
+    options: &RansacOptions<T>,
+    ranked: bool,
+    mut keep_going: Option<&mut dyn FnMut(&Progress) -> bool>,
+    mask: &mut [bool],
+    order: &mut [u32],
+    found: &mut RelativePoseEstimate<T>,
+) {
+    let ranks = if ranked { order.get(..mask.len()) } else { None };
+    let ask = keep_going.as_mut().map(|ask| &mut **ask as &mut dyn FnMut(&_) -> bool);
+    let consensus = ransac::<T, _, 5>(judge.problem, options, ranks, LEAST_INLIERS, ask);
+    found.report = consensus.report;
+    let budget = options.budget.less(&consensus.report.spent);
+    let searched = consensus.report.spent.iterations;
+    judge.judge(&consensus, &mut Left { searched, budget, keep_going }, mask, order, found);
 }
 
 /// The verdict by a way to search and judge.
@@ -453,9 +473,10 @@ fn judged<T: Real, B: EpipolarBlock<T>>(
     units: Units<T>,
     sigma_px: T,
     options: &RelativePoseOptions<T>,
+    ranked: bool,
     workspace: &mut RelativePoseWorkspace<'_, T>,
     found: &mut RelativePoseEstimate<T>,
-    search: impl FnOnce(&Judge<'_, '_, T, B>, &mut [bool], &mut [u32], &mut RelativePoseEstimate<T>),
+    search: impl FnOnce(&Judge<'_, '_, T, B>, bool, &mut [bool], &mut [u32], &mut RelativePoseEstimate<T>),
 ) {
     let count = workspace.count;
     let blocks = B::slice(workspace.numbers);
@@ -469,7 +490,7 @@ fn judged<T: Real, B: EpipolarBlock<T>>(
         seed: options.ransac.seed,
     };
     let mask = workspace.inliers.get_mut(..count).unwrap_or_default();
-    search(&judge, mask, workspace.order, found);
+    search(&judge, ranked, mask, workspace.order, found);
     found.report.inliers = mask.iter().map(|&inlier| inlier as u32).sum();
     found.noise_px *= units.pixels;
 }

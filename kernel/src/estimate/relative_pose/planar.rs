@@ -1,6 +1,6 @@
 //! A plane among the inliers: its homography, the two motions that explain it, and the verdict on a planar scene.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{ArrayStorage, Matrix3, Vector3};
 
 use super::super::chance::EXPLAINED_SIGMAS;
 use super::super::scatter::Scatter;
@@ -9,10 +9,11 @@ use super::judge::{Judge, pose_model};
 use super::verdict::{PlanarPose, RelativePoseEstimate, RelativePoseVerdict};
 use crate::geometry::pose::rotation_matrix;
 use crate::geometry::{Homography, Pose};
+use crate::linalg::vec3::{cross, dot};
 use crate::linalg::{LANES, Ldlt, add_outer, times};
 use crate::real::{from_u32, is_finite, lit, max, sqrt};
 use crate::refine::blocks::EpipolarBlock;
-use crate::refine::homography::{HomographyModel, transfer_sq};
+use crate::refine::homography::{HomographyModel, transfer_equations, transfer_sq};
 use crate::refine::relative_pose::PoseModel;
 use crate::robust::Sampler;
 use crate::robust::loss::Loss;
@@ -39,7 +40,7 @@ const HELD: [usize; 2] = [2, 5];
 #[derive(Clone, Copy, Debug)]
 struct InverseDepth<T: Real> {
     /// On the plane z = 1 of view 1.
-    ray: Vector3<T>,
+    ray: [T; 3],
     /// 1 / z in view 1.
     value: T,
     /// Squared motion in view 2, in the blocks' unit, a unit of `value`.
@@ -49,7 +50,7 @@ struct InverseDepth<T: Real> {
 impl<T: Real> InverseDepth<T> {
     /// The squared distance in view 2 from where `plane' X1 = 1` puts the point.
     fn squared(&self, plane: &Vector3<T>) -> T {
-        let e = self.value - self.ray.dot(plane);
+        let e = self.value - dot(&self.ray, &plane.data.0[0]);
         e * e * self.weight
     }
 }
@@ -110,7 +111,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     /// is refined.
     #[inline(never)]
     fn plane_of_three(&self, pose: &PoseModel<T>, inliers: &[u32], threshold: T) -> Option<Vector3<T>> {
-        let mut entries = [InverseDepth { ray: Vector3::zeros(), value: T::ZERO, weight: T::ZERO }; ENTRIES];
+        let mut entries = [InverseDepth { ray: [T::ZERO; 3], value: T::ZERO, weight: T::ZERO }; ENTRIES];
         let used = core::cmp::min(inliers.len(), ENTRIES);
         // k len / used, without a product that 32 bits do not hold.
         let (whole, rest) =
@@ -128,9 +129,10 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         for k in 0..PLANES {
             let Some(sample) = sampler.sample::<3>(k) else { break };
             let [Some(a), Some(b), Some(c)] = sample.map(|i| entries.get(i as usize)) else { break };
-            let normals = [b.ray.cross(&c.ray), c.ray.cross(&a.ray), a.ray.cross(&b.ray)];
-            let plane = times(&Matrix3::from_columns(&normals), &Vector3::new(a.value, b.value, c.value));
-            let plane = plane * (T::ONE / normals[0].dot(&a.ray));
+            let normals = [cross(&b.ray, &c.ray), cross(&c.ray, &a.ray), cross(&a.ray, &b.ray)];
+            let inverse = T::ONE / dot(&normals[0], &a.ray);
+            let normals = Matrix3::from_data(ArrayStorage(normals));
+            let plane = times(&normals, &Vector3::new(a.value, b.value, c.value)) * inverse;
             let (mut cost, mut allowed) = (T::ZERO, lit::<T>(HEAD));
             for entry in entries {
                 let share = entry.squared(&plane) * scale;
@@ -151,8 +153,9 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         let mut moment = Matrix3::zeros();
         let mut right = Vector3::zeros();
         for entry in entries.iter().filter(|entry| entry.squared(&coarse) < limit * T::TWO) {
-            add_outer(&mut moment, &entry.ray, &entry.ray, entry.weight);
-            right += entry.ray * (entry.value * entry.weight);
+            let ray = Vector3::from(entry.ray);
+            add_outer(&mut moment, &ray, &ray, entry.weight);
+            right += ray * (entry.value * entry.weight);
         }
         let plane = Ldlt::new(&moment)?.solve(&right);
         let held = entries.iter().filter(|entry| entry.squared(&plane) < limit * T::TWO).count();
@@ -164,21 +167,21 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
 
     /// The inverse depth of a correspondence in view 1 under a pose, in baselines; none where it is not finite.
     fn inverse_depth(&self, pose: &PoseModel<T>, index: u32) -> Option<InverseDepth<T>> {
-        let (points, weights) = self.problem.data.blocks.get(index as usize / LANES)?.planes();
-        let lane = index as usize % LANES;
-        let at = |k: usize| points[k].get(lane).copied();
+        let block = self.problem.data.blocks.get(index as usize / LANES)?;
+        let ([x1, y1, x2, y2], share) = block.on_planes(index as usize % LANES)?;
         let (a, b, s) = (pose.scales.inverse1(), pose.scales.inverse2(), pose.scales.view2);
-        let ray = Vector3::new(at(0)? * a[0], at(1)? * a[1], T::ONE);
-        let seen = Vector3::new(at(2)? * b[0], at(3)? * b[1], T::ONE);
-        let t = &pose.translation;
-        let turned = times(&pose.rotation, &ray);
+        let ray = Vector3::new(x1 * a[0], y1 * a[1], T::ONE);
+        let seen = [x2 * b[0], y2 * b[1], T::ONE];
+        let t = &pose.translation.data.0[0];
+        let turned = times(&pose.rotation, &ray).data.0[0];
         // seen x (turned + value t) = 0 in the least-squares sense.
-        let lever = seen.cross(t);
-        let value = -lever.dot(&seen.cross(&turned)) / max(lever.norm_squared(), T::MIN_POSITIVE);
-        let depth = turned.z + value * t.z;
+        let lever = cross(&seen, t);
+        let value = -dot(&lever, &cross(&seen, &turned)) / max(dot(&lever, &lever), T::MIN_POSITIVE);
+        let depth = turned[2] + value * t[2];
         // How far the point moves in view 2 with the inverse depth.
-        let (x, y) = ((t.x - seen.x * t.z) * s[0], (t.y - seen.y * t.z) * s[1]);
-        let weight = (x * x + y * y) * *weights.get(lane)? / (depth * depth);
+        let (x, y) = ((t[0] - seen[0] * t[2]) * s[0], (t[1] - seen[1] * t[2]) * s[1]);
+        let weight = (x * x + y * y) * share / (depth * depth);
+        let ray = ray.data.0[0];
         (is_finite(value) && is_finite(weight)).then_some(InverseDepth { ray, value, weight })
     }
 
@@ -189,8 +192,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         let (mut index, mut length) = (0, 0);
         let mut entries = order.iter_mut();
         for block in self.problem.data.blocks {
-            let (points, weight) = block.planes();
-            for s in transfer_sq(&plane.0, &points, &weight) {
+            for s in transfer_sq(&plane.0, block, T::ONE) {
                 // A NaN is not explained.
                 if !(s < limit)
                     && index < self.problem.data.count as u32
@@ -240,11 +242,13 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         let mut left = self.problem.data.count;
         let s = self.problem.scales.inverse1();
         for block in self.problem.data.blocks {
-            let (points, weight) = block.planes();
-            let squared = transfer_sq(&plane.0, &points, &weight);
+            let squared = transfer_sq(&plane.0, block, T::ONE);
             for l in 0..LANES {
-                if l < left && squared[l] < limit {
-                    let side = normal.x * points[0][l] * s[0] + normal.y * points[1][l] * s[1] + normal.z;
+                if l < left
+                    && squared[l] < limit
+                    && let Some(([x, y, ..], _)) = block.on_planes(l)
+                {
+                    let side = normal.x * x * s[0] + normal.y * y * s[1] + normal.z;
                     ahead += (side > T::ZERO) as u32;
                     behind += (side <= T::ZERO) as u32;
                 }
@@ -265,7 +269,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     ) {
         let support = sigma * lit(PLANE_SIGMAS) * T::TWO;
         let problem = self.transfer_problem(support);
-        let sums = problem.optimise(plane, &Loss::Tukey(support), 1, T::ZERO).equations;
+        let sums = transfer_equations(problem.data, plane, &Loss::Tukey(support));
         let scatter = Scatter::new(problem.data, plane, support);
         self.mark_transfer(&plane.0, mask);
         estimate.noise_px = sqrt(scatter.variance());

@@ -9,10 +9,9 @@ use super::judge::Judge;
 use super::verdict::{PureRotation, RelativePoseEstimate, RelativePoseVerdict};
 use crate::Real;
 use crate::geometry::pose::from_parts;
-use crate::linalg::LANES;
 use crate::real::{from_u32, lit, sqrt};
 use crate::refine::blocks::EpipolarBlock;
-use crate::refine::homography::{RotationModel, transfer_sq};
+use crate::refine::homography::RotationModel;
 use crate::refine::lm::Manifold;
 use crate::robust::loss::Loss;
 
@@ -28,24 +27,11 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         if !(sigma > T::ZERO) {
             return false;
         }
-        if 2 * self.displaced_below(&still, self.least_motion) < self.problem.data.count as u32 {
+        if 2 * (Evidence { sigma, ..*evidence }).explained(&still).all < self.problem.data.count as u32 {
             return false;
         }
         let far = Evidence { sigma: sigma * T::TWO, ..*evidence }.explained(&still);
         MOVED_ONE_IN * far.others <= far.inliers + far.others
-    }
-
-    /// How many correspondences a model displaces by less than `limit`.
-    fn displaced_below(&self, model: &Matrix3<T>, limit: T) -> u32 {
-        let limit = limit * limit;
-        let (mut near, mut left) = (0, self.problem.data.count);
-        for block in self.problem.data.blocks {
-            let (plane, weight) = block.planes();
-            let squared = transfer_sq(model, &plane, &weight);
-            near += squared.iter().take(left).map(|&s| (s < limit) as u32).sum::<u32>();
-            left = left.saturating_sub(LANES);
-        }
-        near
     }
 
     /// True where a rotation moves the points by no more than the noise.
