@@ -1,6 +1,8 @@
 //! Entry points in single precision, each an exported function: `examples/firmware/measure` links the archive once for
-//! every function, with all that it does not reach left out, and once for all of them.
+//! every function, with all that it does not reach left out, and once for all of them. With the feature `alone` it holds the
+//! relative pose with points alone: the compiler then sees every call, as in a firmware that needs nothing else.
 #![no_std]
+#![cfg_attr(feature = "alone", allow(dead_code, unused_imports))]
 #![allow(improper_ctypes_definitions)]
 
 use epipole::bundle::{BundleOptions, BundleReport, Window};
@@ -32,6 +34,13 @@ macro_rules! entries {
 }
 
 entries! {
+    estimate_relative_pose_and_points(c: &Pinhole<f32>, a: &[V2], b: &[V2], max_error_px: f32,
+        w: &mut RelativePoseWorkspace<'_, f32>, points: &mut [Option<V3>])
+        -> Result<RelativePoseEstimate<f32>, RelativePoseError> = with_points(c, a, b, max_error_px, w, points);
+}
+
+#[cfg(not(feature = "alone"))]
+entries! {
     relpose_5pt(a: &[V3; 5], b: &[V3; 5]) -> Solutions<Essential<f32>, 10> = s::relpose_5pt(a, b);
     relpose_5pt_poses(a: &[V3; 5], b: &[V3; 5]) -> Solutions<P, 10> = s::relpose_5pt_poses(a, b);
     relpose_7pt(a: &[V3; 7], b: &[V3; 7]) -> Solutions<epipole::geometry::Fundamental<f32>, 3> = s::relpose_7pt(a, b);
@@ -54,9 +63,6 @@ entries! {
     kannala_brandt_unproject(c: &KannalaBrandt<f32>, x: &V2) -> Option<V3> = c.unproject(x).ok();
     estimate_relative_pose(c: &Pinhole<f32>, a: &[V2], b: &[V2], o: &RelativePoseOptions<f32>, w: &mut RelativePoseWorkspace<'_, f32>)
         -> Option<RelativePoseEstimate<f32>> = relative_pose(c, c, a, b, o, w).ok();
-    estimate_relative_pose_and_points(c: &Pinhole<f32>, a: &[V2], b: &[V2], max_error_px: f32,
-        w: &mut RelativePoseWorkspace<'_, f32>, points: &mut [Option<V3>])
-        -> Option<RelativePoseEstimate<f32>> = with_points(c, a, b, max_error_px, w, points);
     estimate_absolute_pose(c: &Pinhole<f32>, a: &[V2], b: &[V3], o: &AbsolutePoseOptions<f32>, w: &mut AbsolutePoseWorkspace<'_, f32>)
         -> Option<AbsolutePoseEstimate<f32>> = absolute_pose(c, a, b, o, w).ok();
     estimate_homography(a: &[V2], b: &[V2], o: &HomographyOptions<f32>, w: &mut HomographyWorkspace<'_, f32>)
@@ -80,19 +86,23 @@ fn with_points(
     max_error_px: f32,
     workspace: &mut RelativePoseWorkspace<'_, f32>,
     points: &mut [Option<V3>],
-) -> Option<RelativePoseEstimate<f32>> {
+) -> Result<RelativePoseEstimate<f32>, RelativePoseError> {
     let mut options = RelativePoseOptions::default();
     options.max_error_px = max_error_px;
-    let estimate = relative_pose(camera, camera, x1, x2, &options, workspace).ok()?;
-    let pair = ViewPair::new(&estimate.pose()?);
-    let views = x1.iter().zip(x2).zip(workspace.inliers());
-    for (point, ((a, b), &inlier)) in points.iter_mut().zip(views) {
-        *point = None;
-        if inlier && let (Ok(a), Ok(b)) = (camera.unproject(a), camera.unproject(b)) {
-            *point = pair.triangulate_midpoint(&a, &b).point();
+    let estimate = relative_pose(camera, camera, x1, x2, &options, workspace);
+    if let Ok(estimate) = &estimate
+        && let Some(pose) = estimate.pose()
+    {
+        let pair = ViewPair::new(&pose);
+        let views = x1.iter().zip(x2).zip(workspace.inliers());
+        for (point, ((a, b), &inlier)) in points.iter_mut().zip(views) {
+            *point = None;
+            if inlier && let (Ok(a), Ok(b)) = (camera.unproject(a), camera.unproject(b)) {
+                *point = pair.triangulate_midpoint(&a, &b).point();
+            }
         }
     }
-    Some(estimate)
+    estimate
 }
 
 fn fill(window: &mut Window<'_, f32>, camera: &Camera<f32>, pose: &P, point: &V3, pixel: &V2) -> Option<()> {
