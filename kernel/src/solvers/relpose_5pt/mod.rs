@@ -120,9 +120,7 @@ pub fn relpose_5pt_poses<T: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) ->
 #[inline(never)]
 fn solve<T: Real, W: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5], found: &mut Found<T>) {
     let mut rows = [HiddenRow::ZERO; 3];
-    let Some(basis) = null_basis(x1, x2) else { return };
-    found.basis = basis;
-    if hidden_rows(&found.basis, &mut rows).is_none() {
+    if null_basis(x1, x2, &mut found.basis).is_none() || hidden_rows(&found.basis, &mut rows).is_none() {
         return;
     }
     let [inside, outside] = found.add_roots(&rows, Chart::<T, W>::Line);
@@ -140,7 +138,7 @@ fn solve<T: Real, W: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5], found: &m
 
 /// An orthonormal basis, element by element, of the matrices that the five equations leave.
 #[inline(never)]
-fn null_basis<T: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) -> Option<[[T; 4]; 9]> {
+fn null_basis<T: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5], basis: &mut [[T; 4]; 9]) -> Option<()> {
     let mut columns = [[T::ZERO; 5]; 9];
     for r in 0..5 {
         let (a, b) = (&x1[r].data.0[0], &x2[r].data.0[0]);
@@ -150,7 +148,8 @@ fn null_basis<T: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5]) -> Option<[[T
             }
         }
     }
-    null_space_of_columns(columns)
+    *basis = null_space_of_columns(columns)?;
+    Some(())
 }
 
 /// The three equations that the coefficients of the basis matrices satisfy.
