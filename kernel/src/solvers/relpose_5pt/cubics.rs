@@ -11,17 +11,14 @@ pub(super) type Cubic<T> = [T; 20];
 
 #[cfg_attr(not(small), inline(always))]
 #[cfg_attr(small, inline(never))]
-fn add<T: Real, const N: usize>(a: &[T; N], b: &[T; N]) -> [T; N] {
-    let mut sum = *a;
+fn add<T: Real, const N: usize>(sum: &mut [T; N], b: &[T; N]) {
     sum.iter_mut().zip(b).for_each(|(x, y)| *x += *y);
-    sum
 }
 
 #[cfg_attr(not(small), inline(always))]
-fn sub<T: Real, const N: usize>(a: &[T; N], b: &[T; N]) -> [T; N] {
-    let mut difference = *a;
+#[cfg_attr(small, inline(never))]
+fn subtract<T: Real, const N: usize>(difference: &mut [T; N], b: &[T; N]) {
     difference.iter_mut().zip(b).for_each(|(x, y)| *x -= *y);
-    difference
 }
 
 #[cfg_attr(not(small), inline(always))]
@@ -71,16 +68,20 @@ fn quadric_times_linear<T: Real>(q: &Quadric<T>, l: &Linear<T>) -> Cubic<T> {
 #[cfg_attr(not(small), inline(always))]
 #[cfg_attr(small, inline(never))]
 fn linear_dot<T: Real>(a: &[&Linear<T>; 3], b: &[&Linear<T>; 3]) -> Quadric<T> {
-    let product = |k: usize| linear_times_linear(a[k], b[k]);
-    add(&add(&product(0), &product(1)), &product(2))
+    let mut sum = linear_times_linear(a[0], b[0]);
+    add(&mut sum, &linear_times_linear(a[1], b[1]));
+    add(&mut sum, &linear_times_linear(a[2], b[2]));
+    sum
 }
 
 /// The sum of three products.
 #[cfg_attr(not(small), inline(always))]
 #[cfg_attr(small, inline(never))]
 fn quadric_dot<T: Real>(q: &[&Quadric<T>; 3], l: &[&Linear<T>; 3]) -> Cubic<T> {
-    let product = |k: usize| quadric_times_linear(q[k], l[k]);
-    add(&add(&product(0), &product(1)), &product(2))
+    let mut sum = quadric_times_linear(q[0], l[0]);
+    add(&mut sum, &quadric_times_linear(q[1], l[1]));
+    add(&mut sum, &quadric_times_linear(q[2], l[2]));
+    sum
 }
 
 /// Writes `E E' E - tr(E E') E / 2 = 0` (nine cubics) and `det E = 0`, of the entries of `E` (row by row) as linear forms.
@@ -89,15 +90,22 @@ pub(super) fn essential_cubics<T: Real>(e: &[Linear<T>; 9], cubics: &mut [Cubic<
     let [e0, e1, e2, e3, e4, e5, e6, e7, e8] = e;
     let rows = [[e0, e1, e2], [e3, e4, e5], [e6, e7, e8]];
     let product = |r: usize, s: usize| linear_dot(&rows[r], &rows[s]);
-    let (a00, a11, a22) = (product(0, 0), product(1, 1), product(2, 2));
+    let (mut l00, mut l11, mut l22) = (product(0, 0), product(1, 1), product(2, 2));
     let (a01, a02, a12) = (product(0, 1), product(0, 2), product(1, 2));
-    let half_trace = add(&add(&a00, &a11), &a22).map(|v| v * T::HALF);
     // L = E E' - tr(E E') / 2, symmetric.
-    let (l00, l11, l22) = (sub(&a00, &half_trace), sub(&a11, &half_trace), sub(&a22, &half_trace));
+    let mut half_trace = l00;
+    add(&mut half_trace, &l11);
+    add(&mut half_trace, &l22);
+    half_trace.iter_mut().for_each(|v| *v *= T::HALF);
+    for diagonal in [&mut l00, &mut l11, &mut l22] {
+        subtract(diagonal, &half_trace);
+    }
     let l = [[&l00, &a01, &a02], [&a01, &l11, &a12], [&a02, &a12, &l22]];
     let columns = [[e0, e3, e6], [e1, e4, e7], [e2, e5, e8]];
     let minor = |a: usize, b: usize| {
-        sub(&linear_times_linear(rows[1][a], rows[2][b]), &linear_times_linear(rows[1][b], rows[2][a]))
+        let mut minor = linear_times_linear(rows[1][a], rows[2][b]);
+        subtract(&mut minor, &linear_times_linear(rows[1][b], rows[2][a]));
+        minor
     };
     cubics[9] = quadric_dot(&[&minor(1, 2), &minor(2, 0), &minor(0, 1)], &rows[0]);
     for (traces, l) in cubics.as_chunks_mut::<3>().0.iter_mut().zip(&l) {
