@@ -11,7 +11,7 @@ use crate::robust::Sampler;
 /// Lines tried, each through two inliers.
 const LINES: u32 = 24;
 /// Where hardly a point may lie off a line, so many more than half of those looked at end the look.
-const FEW_OFF: u32 = 5;
+const FEW_OFF: u32 = 3;
 /// Distinct points looked for at the most.
 const DISTINCT: usize = 12;
 /// Points of repetitions lie within this many standard deviations of each other.

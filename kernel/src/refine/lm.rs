@@ -229,37 +229,45 @@ impl<T: Real, const P: usize> Sums<T, P> {
     ) -> (u32, usize) {
         let (mut active, mut seen) = (0u32, 0usize);
         let none = Row { c: T::ZERO, inverse: T::ZERO, j: [T::ZERO; P] };
-        let (mut pending, mut filled) = ([none; LANES], 0usize);
+        // Those that wait for a lane each, and after them those of a block.
+        let mut rows = [none; 2 * LANES];
+        let mut waiting = 0usize;
         let mut left = data.count;
         for block in data.blocks.iter().step_by(step) {
-            let (mut rows, mut found) = ([none; LANES], 0usize);
+            let mut end = waiting;
             for l in 0..LANES {
                 if l < left && M::inside(frame, block, l, limit) {
-                    if let Some(place) = rows.get_mut(found) {
+                    if let Some(place) = rows.get_mut(end) {
                         *place = M::row(frame, block, l);
                     }
-                    found += 1;
+                    end += 1;
                 }
             }
             seen += core::cmp::min(left, LANES);
             left = left.saturating_sub(step.saturating_mul(LANES));
-            active += found as u32;
-            if found == LANES {
-                self.add_rows(&rows, LANES, loss);
+            active += (end - waiting) as u32;
+            if end - waiting == LANES {
+                // A full block does not wait.
+                if let Some(full) = rows.get(waiting..).and_then(|rows| rows.first_chunk()) {
+                    self.add_rows(full, LANES, loss);
+                }
                 continue;
             }
-            for row in rows.iter().take(found) {
-                if let Some(place) = pending.get_mut(filled) {
+            waiting = end;
+            if let Some(over) = end.checked_sub(LANES) {
+                let (full, rest) = rows.split_at_mut(LANES);
+                if let Some(full) = full.first_chunk() {
+                    self.add_rows(full, LANES, loss);
+                }
+                for (place, row) in full.iter_mut().zip(rest).take(over) {
                     *place = *row;
                 }
-                filled += 1;
-                if filled == LANES {
-                    filled = 0;
-                    self.add_rows(&pending, LANES, loss);
-                }
+                waiting = over;
             }
         }
-        self.add_rows(&pending, filled, loss);
+        if let Some(rest) = rows.first_chunk() {
+            self.add_rows(rest, waiting, loss);
+        }
         (active, seen)
     }
 }

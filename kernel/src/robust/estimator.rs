@@ -53,6 +53,11 @@ pub trait Estimator<T: Real, const S: usize> {
         false
     }
 
+    /// True where a polished model is so near `best`, the best model so far, that nothing but the same optimum can come of it.
+    fn leads_back(&self, _model: &Self::Model, _best: &Self::Model) -> bool {
+        false
+    }
+
     /// True where more samples would lead to a model that is no better than this one, the best so far, for what all of
     /// them tell: then [`DISCOVERIES`](Self::DISCOVERIES) asks for no more. Adds the residuals evaluated.
     fn settles(&self, _model: &Self::Model, _residuals: &mut u64) -> bool {

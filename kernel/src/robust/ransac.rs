@@ -133,6 +133,9 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
                 return;
             }
             let Some(model) = &estimator.polish(model, bound, &mut search.counts) else { return };
+            if best.is_some_and(|(best, _)| estimator.leads_back(model, &best)) {
+                return;
+            }
             search.gate.bound = bound;
             let Some(score) = estimator.score(model, &search.gate, &mut search.counts) else { return };
             if score.cost < search.minimal.cost {

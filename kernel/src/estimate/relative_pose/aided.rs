@@ -35,6 +35,8 @@ const LOCAL_STEPS: u32 = 1;
 const WIDE_SIGMAS: f64 = 1.0;
 /// Where wrong correspondences lie within the wide threshold more often than this, the prior is too vague to sample by.
 const VAGUE: f64 = 0.3;
+/// Squared distance of rotation and translation, rad, below which two polished models lead to one optimum.
+const SAME_POSE_SQ: f64 = 0.001;
 /// Probability with which a rival of a prior's consensus is found if there is one.
 const RIVAL_CONFIDENCE: f64 = 0.85;
 /// A smaller share of inliers is left to the search without the prior.
@@ -193,6 +195,10 @@ impl<T: Real, B: EpipolarBlock<T>, K: Minimal<T, S>, const S: usize> Estimator<T
     fn repeats(&self, sample: &[u32; S], best: &PoseModel<T>) -> bool {
         // What a sample of inliers leads to is the optimum among them.
         self.problem.explains(best, sample)
+    }
+
+    fn leads_back(&self, model: &PoseModel<T>, best: &PoseModel<T>) -> bool {
+        model.distance_sq(best) < lit(SAME_POSE_SQ)
     }
 
     fn refine(&self, model: &PoseModel<T>, residuals: &mut u64) -> Option<PoseModel<T>> {

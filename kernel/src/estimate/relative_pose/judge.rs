@@ -102,6 +102,10 @@ const MORE_SAMPLES: [u32; 2] = [60, 300];
 /// what it is said to be), is reported beside them: of exact planes one in forty has one, of real scenes that count as
 /// planes four in five. Of motions that differ by less none is proven.
 const RIVAL: f64 = 3.0;
+/// A pose of a plane that costs more than the pose found by this share of the inliers is not refined; with a prior, which
+/// keeps the search near the truth, it hardly ever ends below.
+const AGAINST: f64 = 0.5;
+const AGAINST_AIDED: f64 = 0.25;
 /// With how many others each correspondence is mispaired to measure what chance explains: at first, and where the verdict
 /// hangs on it.
 const MISPAIRED: usize = 3;
@@ -227,6 +231,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                 let mut least = self.cost(&refined.model);
                 let pose = refined.model;
                 let leads_back = |twin: &PoseModel<T>| twin.distance_sq(&pose) < lit(SAME_POSE_SQ);
+                let against = lit(if problem.prior.is_some() { AGAINST_AIDED } else { AGAINST });
                 let mut moved = false;
                 // What a free pose gains of the noise grows with its square.
                 let louder = sigma / self.sigma;
@@ -244,8 +249,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                     }
                 }
                 for twin in &twins {
-                    // Nor is one worth it that half of the inliers speak against.
-                    let far = twin.cost > least + from_u32::<T>(inliers) * T::HALF;
+                    let far = twin.cost > least + from_u32::<T>(inliers) * against;
                     let twin = pose_model(&twin.pose, problem);
                     if clear && (far || leads_back(&twin)) {
                         continue;

@@ -160,7 +160,13 @@ impl<T: Real> CameraModel<T> for Pinhole<T> {
     #[cfg_attr(not(small), inline)]
     #[cfg_attr(small, inline(never))]
     fn unproject(&self, pixel: &Vector2<T>) -> Result<Vector3<T>, UnprojectError> {
-        self.unproject_with_jacobian(pixel).map(|(bearing, _)| bearing)
+        let p = self.to_plane(pixel);
+        // The square of the distance must not overflow, or the bearing would be (0, 0, 0).
+        if is_finite(p.norm_squared()) {
+            Ok(bearing_of_plane_point(&p).0)
+        } else {
+            Err(UnprojectError::NotFinite)
+        }
     }
 
     #[inline]
@@ -169,7 +175,6 @@ impl<T: Real> CameraModel<T> for Pinhole<T> {
         pixel: &Vector2<T>,
     ) -> Result<(Vector3<T>, Matrix3x2<T>), UnprojectError> {
         let p = self.to_plane(pixel);
-        // The square of the distance must not overflow, or the bearing would be (0, 0, 0).
         if !is_finite(p.norm_squared()) {
             return Err(UnprojectError::NotFinite);
         }
