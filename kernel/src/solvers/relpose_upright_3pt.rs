@@ -35,7 +35,7 @@ use crate::{Real, Solutions};
 ///
 /// # Cost
 /// Two or three steps on a cubic, a square root for each two solutions, two more for each one. Roots that are close
-/// together by the measure of the scalar's rounding (half of them in `f32`, next to none in `f64`) are found, or refined by
+/// together by the measure of the scalar's rounding (one in nine in `f32`, next to none in `f64`) are found, or refined by
 /// a Newton step, on the normals themselves.
 ///
 /// # References
@@ -94,8 +94,7 @@ fn solve<T: Real>(x1: &[Vector3<T>; 3], x2: &[Vector3<T>; 3], solutions: &mut So
     let (first, second, mixed_first, mixed_second) =
         if swapped { (-s2.0 - r, s2.0 - r, -s1.0, s1.1) } else { (s2.0 - r, -s2.0 - r, s1.1, -s1.0) };
     let lines = lines_of_conic([first, s2.1, mixed_first, second, mixed_second, r - s0]);
-    let mut candidates = [((T::ZERO, T::ZERO), T::ZERO); 4];
-    let mut count = 0;
+    let mut candidates = Solutions::<_, 4>::new();
     for line in lines {
         let inverse = T::ONE / (line.x * line.x + line.y * line.y);
         let k = line.z * inverse;
@@ -103,7 +102,7 @@ fn solve<T: Real>(x1: &[Vector3<T>; 3], x2: &[Vector3<T>; 3], solutions: &mut So
         // The square of half the chord that the circle cuts off.
         let half_sq = T::ONE - k * line.z;
         let mut reach = T::ZERO;
-        let pair = if half_sq * half_sq < T::EPSILON * lit(0.25) {
+        let pair = if half_sq * half_sq < T::EPSILON * lit(0.0625) {
             let foot = if swapped { (foot_y, foot_x) } else { (foot_x, foot_y) };
             // Half the second derivative at the foot.
             let (product, difference) = (foot.0 * foot.1, foot.0 * foot.0 - foot.1 * foot.1);
@@ -115,7 +114,7 @@ fn solve<T: Real>(x1: &[Vector3<T>; 3], x2: &[Vector3<T>; 3], solutions: &mut So
             reach = separation_sq;
             pair
         } else if half_sq > T::ZERO {
-            if half_sq < T::EPSILON * lit(65_536.0) {
+            if half_sq < T::EPSILON * lit(1_024.0) {
                 reach = half_sq;
             }
             let half = sqrt(half_sq * inverse);
@@ -126,13 +125,10 @@ fn solve<T: Real>(x1: &[Vector3<T>; 3], x2: &[Vector3<T>; 3], solutions: &mut So
             continue;
         };
         for root in pair {
-            if let Some(candidate) = candidates.get_mut(count) {
-                *candidate = (root, reach);
-            }
-            count += 1;
+            candidates.push((root, reach));
         }
     }
-    for &(e, reach) in candidates.iter().take(count) {
+    for &(e, reach) in &candidates {
         // In radians; zero for a root that is well conditioned.
         let step = if reach > T::ZERO { newton(e, (s2, s1), inverse_size, reach, x1, x2) } else { T::ZERO };
         let e = (e.0 - step * e.1, e.1 + step * e.0);
