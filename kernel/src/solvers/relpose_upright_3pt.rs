@@ -215,18 +215,19 @@ fn push_pose<T: Real>(
     let (a1, b1) = (z1.dot(&n0), y1.dot(&n0));
     let t = n0.cross(&n1);
     let square = t.norm_squared();
+    if !is_wide(square, &n0, &n1) {
+        return false;
+    }
     if (a0 * b0 > T::ZERO) & (a0 * a1 < T::ZERO) & (a1 * b1 > T::ZERO) {
         let y2 = turned(e, &x1[2]);
         let across = t.cross(&y2.cross(z2));
-        let in_front = (a0 * across.dot(z2) > T::ZERO) & (a0 * across.dot(&y2) > T::ZERO);
-        if in_front && is_wide(square, &n0, &n1) {
+        if (a0 * across.dot(z2) > T::ZERO) & (a0 * across.dot(&y2) > T::ZERO) {
             // Over the root, without waiting for it.
             let t = t * with_sign_of(sqrt(square) * (T::ONE / square), a0);
             solutions.push(Pose::from_parts(Translation3::from(t), rotation_about_y(e.0, e.1)));
-            return true;
         }
     }
-    is_wide(square, &n0, &n1)
+    true
 }
 
 /// The same from the other two pairs of points.
