@@ -38,6 +38,12 @@ impl<T: Real, B: EpipolarBlock<T>> TransferProblem<'_, T, B> {
         Some((Vector3::new(x1, y1, T::ONE), Vector3::new(x2, y2, T::ONE)))
     }
 
+    /// The truncated cost of a model.
+    pub(super) fn cost(&self, model: &HomographyModel<T>) -> T {
+        let score = self.score(model, &Gate::open(), &mut ScoreCounts::default());
+        score.map_or(T::MAX, |score| score.cost)
+    }
+
     /// The model that minimises a loss, from `model`.
     pub(super) fn optimise<M: Tangents<T, P>, const P: usize>(
         &self,
@@ -55,6 +61,9 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 4> for TransferProblem<'_, T, B>
     type Model = HomographyModel<T>;
 
     const NEAR_MISSES: u32 = 2;
+
+    // One does where most correspondences agree.
+    const DISCOVERIES: u32 = 2;
 
     fn count(&self) -> u32 {
         self.subset.map_or(self.data.count, <[u32]>::len) as u32

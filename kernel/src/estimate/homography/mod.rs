@@ -13,7 +13,7 @@ use super::transfer::TransferProblem;
 use super::workspace::{TwoViewStorage, TwoViewWorkspace};
 use crate::Real;
 use crate::linalg::LANES;
-use crate::real::{lit, max, min, sqrt};
+use crate::real::{from_u32, lit, max, min, sqrt};
 use crate::refine::blocks::{Block, BlockSlice, PlaneBlock};
 use crate::refine::homography::{HomographyModel, transfer_sq};
 use crate::robust::budget::check_noise;
@@ -217,6 +217,17 @@ const SUPPORT_SIGMAS: f64 = 8.0;
 /// The least and the largest such place, in thresholds.
 const SUPPORT: [f64; 2] = [1.5, 2.8];
 
+/// Where the weight of a refinement vanishes, in thresholds, that finds the optimum of the inliers alone.
+const INLIER_SUPPORT: f64 = 1.2;
+
+/// A last refinement that costs more than the optimum of the inliers by so many correspondences, and by this share of all,
+/// has been drawn away by what lies beside the plane.
+const DRAWN_AWAY: [f64; 2] = [2.0, 0.005];
+
+/// Then its support is this much narrower, at the most so often.
+const NARROWER: f64 = 0.7;
+const NARROWED: u32 = 4;
+
 struct Judge<'a, 'b, T: Real> {
     problem: &'a TransferProblem<'b, T, PlaneBlock<T>>,
     /// Standard deviation of a coordinate in the blocks' unit, as the options have it.
@@ -259,12 +270,29 @@ impl<T: Real> Judge<'_, '_, T> {
     ) -> (HomographyVerdict<T>, T) {
         let problem = self.problem;
         let data = problem.data;
+        // Beside a plane there are often others that a homography follows at twice the threshold: what holds the inliers
+        // alone may explain more.
+        let (best, least_cost) = self.of_inliers(best);
         // What lies beyond the threshold takes part at a falling weight, as far as the noise of this plane may reach.
-        let noise = sqrt(Scatter::new(data, best, problem.threshold * T::TWO).variance());
-        let [least, largest] = [problem.threshold * lit(SUPPORT[0]), problem.threshold * lit(SUPPORT[1])];
-        let support = min(max(noise * lit(SUPPORT_SIGMAS), least), largest);
-        let minimum = problem.optimise(best, &Loss::Tukey(support), FINAL_PASSES, lit(1e-4));
-        let Some(model) = HomographyModel::new(&minimum.model.0) else {
+        let noise = sqrt(Scatter::new(data, &best, problem.threshold * T::TWO).variance());
+        let [least, largest] = SUPPORT.map(|share| problem.threshold * lit(share));
+        let mut support = min(max(noise * lit(SUPPORT_SIGMAS), least), largest);
+        let margin = lit::<T>(DRAWN_AWAY[0]) + from_u32::<T>(data.count as u32) * lit(DRAWN_AWAY[1]);
+        let refined = |support: T| {
+            let minimum = problem.optimise(&best, &Loss::Tukey(support), FINAL_PASSES, lit(1e-4));
+            let model = HomographyModel::new(&minimum.model.0)?;
+            let drawn_away = problem.cost(&model) > least_cost + margin;
+            Some((model, minimum.equations, drawn_away))
+        };
+        let mut found = refined(support);
+        for _ in 0..NARROWED {
+            if !found.as_ref().is_some_and(|&(.., drawn_away)| drawn_away) {
+                break;
+            }
+            support *= lit(NARROWER);
+            found = refined(support);
+        }
+        let Some((model, equations, _)) = found else {
             return (self.without_model(mask, order), T::ZERO);
         };
         let inliers = self.mark(&model, mask);
@@ -298,9 +326,21 @@ impl<T: Real> Judge<'_, '_, T> {
         let found = FoundHomography {
             homography,
             corners: corners.map(|corner| to_pixels(self.frame, corner)),
-            covariance: covariance(&model, &minimum.equations, &scatter, &corners, self.frame),
+            covariance: covariance(&model, &equations, &scatter, &corners, self.frame),
         };
         (HomographyVerdict::Found(found), noise)
+    }
+
+    /// The optimum next to a model of what lies within the threshold, and its cost: the model itself where that is no lower.
+    fn of_inliers(&self, best: &HomographyModel<T>) -> (HomographyModel<T>, T) {
+        let problem = self.problem;
+        let loss = Loss::Tukey(problem.threshold * lit(INLIER_SUPPORT));
+        let near = problem.optimise(best, &loss, FINAL_PASSES, lit(1e-3)).model;
+        let cost = problem.cost(best);
+        match HomographyModel::new(&near.0).map(|model| (model, problem.cost(&model))) {
+            Some((model, lower)) if lower < cost => (model, lower),
+            _ => (*best, cost),
+        }
     }
 
     /// Writes the inliers and counts them.
