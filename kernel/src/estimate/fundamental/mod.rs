@@ -66,7 +66,8 @@ impl<T: Real> Default for FundamentalOptions<T> {
 /// [`FundamentalError`]; workspace and mask are untouched.
 ///
 /// # Degeneracies
-/// Inliers of one plane or of a camera that only turned, but for as few as chance explains: [`FundamentalVerdict::Planar`].
+/// Inliers of one plane or of a camera that only turned, but for as few as chance explains and no more than three in ten:
+/// [`FundamentalVerdict::Planar`].
 /// Inliers on one line, or repetitions of fewer than seven distinct points: [`FundamentalVerdict::Unobservable`].
 ///
 /// # Accuracy
