@@ -284,13 +284,15 @@ impl<T: Real> Judge<'_, '_, T> {
             let drawn_away = problem.cost(&model) > least_cost + margin;
             Some((model, minimum.equations, drawn_away))
         };
-        let mut found = refined(support);
-        for _ in 0..NARROWED {
-            if !found.as_ref().is_some_and(|&(.., drawn_away)| drawn_away) {
+        let mut found = None;
+        for narrowed in 0..=NARROWED {
+            if narrowed > 0 {
+                support *= lit(NARROWER);
+            }
+            found = refined(support);
+            if !matches!(found, Some((.., true))) {
                 break;
             }
-            support *= lit(NARROWER);
-            found = refined(support);
         }
         let Some((model, equations, _)) = found else {
             return (self.without_model(mask, order), T::ZERO);
