@@ -106,6 +106,20 @@ fn outcome<T: Real>((estimate, mask): (RelativePoseEstimate<T>, Vec<bool>)) -> S
 }
 
 in_both_scalars! {
+    /// Within a threshold far tighter than the prior, what lies a degree from the best model still replaces it: a quarter more
+    /// samples than within a wide one, not twice as many.
+    fn a_tight_threshold_takes_hardly_more_samples<T>() {
+        let mut iterations = 0;
+        for_each_case(40, |seed, rng| {
+            let problem = Scene::new(Motion::General, 100).noise_px(0.01).outliers(0.3).generate(seed);
+            let mut options = options::<T>(Some(gravity(&problem, 0.6 * DEGREE, 0.6 * DEGREE, rng)));
+            options.max_error_px = lit(0.08);
+            let (estimate, _) = estimate_scene(&problem, &options).unwrap();
+            iterations += estimate.report.spent.iterations;
+        });
+        assert!(iterations < 40 * 26, "{iterations}");
+    }
+
     /// At most a third of the iterations at half outliers, and no worse.
     fn a_prior_saves_samples<T>() {
         let (mut iterations, mut auc) = ([0; 3], [0.0; 3]);

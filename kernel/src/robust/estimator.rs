@@ -53,7 +53,9 @@ pub trait Estimator<T: Real, const S: usize> {
         false
     }
 
-    /// True where a polished model is so near `best`, the best model so far, that nothing but the same optimum can come of it.
+    /// True where a polished model is so near `best`, the best model so far, that nothing but the same optimum can come of
+    /// it: then it is not scored, and no discovery. How near that is depends on the threshold, too: optimisation on the
+    /// inliers of a tight one reaches less far.
     fn leads_back(&self, _model: &Self::Model, _best: &Self::Model) -> bool {
         false
     }

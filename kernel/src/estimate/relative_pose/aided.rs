@@ -16,7 +16,7 @@ use super::verdict::{RelativePoseEstimate, RelativePoseVerdict};
 use crate::Real;
 use crate::geometry::pose::upright;
 use crate::linalg::LANES;
-use crate::real::{abs, from_u32, lit, max, sqrt};
+use crate::real::{abs, from_u32, lit, max, min, sqrt};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock};
 use crate::refine::relative_pose::PoseModel;
 use crate::robust::budget::after;
@@ -35,8 +35,10 @@ const LOCAL_STEPS: u32 = 1;
 const WIDE_SIGMAS: f64 = 1.0;
 /// Where wrong correspondences lie within the wide threshold more often than this, the prior is too vague to sample by.
 const VAGUE: f64 = 0.3;
-/// Squared distance of rotation and translation, rad, below which two polished models lead to one optimum.
+/// Squared distance of rotation and translation, rad, below which two polished models lead to one optimum, and in squared
+/// thresholds: within a tight one a step hardly leads from so far.
 const SAME_POSE_SQ: f64 = 0.001;
+const SAME_POSE_THRESHOLDS_SQ: f64 = 400.0;
 /// Probability with which a rival of a prior's consensus is found if there is one.
 const RIVAL_CONFIDENCE: f64 = 0.85;
 /// A smaller share of inliers is left to the search without the prior.
@@ -198,7 +200,8 @@ impl<T: Real, B: EpipolarBlock<T>, K: Minimal<T, S>, const S: usize> Estimator<T
     }
 
     fn leads_back(&self, model: &PoseModel<T>, best: &PoseModel<T>) -> bool {
-        model.distance_sq(best) < lit(SAME_POSE_SQ)
+        let threshold = self.problem.threshold;
+        model.distance_sq(best) < min(lit(SAME_POSE_SQ), threshold * threshold * lit(SAME_POSE_THRESHOLDS_SQ))
     }
 
     fn refine(&self, model: &PoseModel<T>, residuals: &mut u64) -> Option<PoseModel<T>> {
