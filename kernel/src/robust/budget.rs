@@ -29,7 +29,7 @@ pub struct RansacOptions<T> {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct Budget {
-    /// Samples drawn. Default 10,000; options of the models of two views: 100,000.
+    /// Samples drawn. Default 10,000; options of a relative pose and of a fundamental matrix: 100,000.
     pub max_iterations: u32,
     /// Minimal problems solved (degenerate samples cost none). Default: no limit.
     pub max_solver_calls: u32,
@@ -63,8 +63,8 @@ impl<T: Real> Default for RansacOptions<T> {
 }
 
 impl<T: Real> RansacOptions<T> {
-    /// The defaults of the models of two views, whose samples are so large that 10,000 of them may miss a tenth of inliers.
-    pub(crate) fn of_two_views() -> Self {
+    /// The defaults where a sample takes so many correspondences that 10,000 of them miss one of a fifth of inliers.
+    pub(crate) fn of_large_samples() -> Self {
         Self { budget: Budget { max_iterations: 100_000, ..Budget::default() }, ..Self::default() }
     }
 

@@ -52,7 +52,7 @@ pub struct HomographyOptions<T> {
 
 impl<T: Real> Default for HomographyOptions<T> {
     fn default() -> Self {
-        Self { max_error_px: lit(3.0), sigma_px: None, ransac: RansacOptions::of_two_views() }
+        Self { max_error_px: lit(3.0), sigma_px: None, ransac: RansacOptions::default() }
     }
 }
 
