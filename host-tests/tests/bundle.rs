@@ -232,6 +232,29 @@ fn poses_alone_and_points_alone() {
     assert!(off(&window, 3) < 1e-5 && off(&window, 2) < 1e-5);
 }
 
+#[test]
+fn a_point_report_tells_what_disagrees() {
+    // All at the truth, one pixel of the first point 12 deviations off.
+    let mut p = problem(1, 0.0, 0.0);
+    (p.poses, p.points) = (p.true_poses.clone(), p.true_points.clone());
+    p.observations[3].2.x += 12.0;
+    assert_eq!((p.observations[3].0, p.observations[3].1), (3, 0));
+    let (mut memory, frames, points) = filled::<f64>(&p);
+    let mut window = memory.window();
+    let report = window.point_report(points[0], 5.0).unwrap();
+    assert_eq!((report.observations, report.outliers, report.behind), (5, 1, 0));
+    assert!((report.rms_sigma - 12.0 / 5.0_f64.sqrt()).abs() < 1e-9, "{}", report.rms_sigma);
+    assert_eq!(window.point_report(points[0], 13.0).unwrap().outliers, 0);
+    // A camera that has turned its back sees nothing, which is no distance.
+    let turn = UnitQuaternion::from_euler_angles(0.0, std::f64::consts::PI, 0.0);
+    window.set_pose(frames[3], &(Pose::from_parts(Vector3::zeros().into(), turn) * p.poses[3])).unwrap();
+    let report = window.point_report(points[0], 5.0).unwrap();
+    assert_eq!((report.observations, report.outliers, report.behind), (5, 0, 1));
+    assert!(report.rms_sigma < 1e-9);
+    window.remove_point(points[0]).unwrap();
+    assert_eq!(window.point_report(points[0], 5.0), Err(BundleError::StalePoint));
+}
+
 /// Points on all sides but straight behind: beyond 76 degrees off the axis the linearisation turns its axes.
 fn a_fisheye_sees_to_the_side<T: Real>(tolerance: f64, most_iterations: u32) {
     let mut rng = Rng::new(31);
