@@ -74,7 +74,7 @@ pub fn iterations_needed<T: Real>(confidence: T, inliers: u32, count: u32, sampl
 /// The probability that none of `iterations` samples held inliers only.
 ///
 /// # Accuracy
-/// A relative error of at most `iterations` times `EPSILON`.
+/// An error of at most `iterations * (sample_size + 1)` times `EPSILON`, for that of a sample's probability grows with them.
 ///
 /// # Examples
 /// ```
@@ -178,6 +178,24 @@ mod tests {
             assert!((single / n as f64 - 1.0).abs() < 1e-3 || single - n as f64 <= 1.0, "{single} {n}");
         }
         assert_eq!(iterations_needed(0.999f32, 4, 100, 5), u32::MAX);
+    }
+
+    #[test]
+    fn the_miss_is_as_accurate_as_it_says() {
+        for (inliers, count) in [(50, 100), (20, 1000), (99, 100), (999_999, 1_000_000), (30, 100), (7, 7)] {
+            for iterations in [0, 1, 2, 3, 7, 100, 12_345, 1_000_000] {
+                for size in 1..8 {
+                    let single = miss_probability::<f32>(iterations, inliers, count, size) as f64;
+                    let double = miss_probability::<f64>(iterations, inliers, count, size);
+                    let bound = iterations as f64 * (size + 1) as f64 * f32::EPSILON as f64;
+                    assert!(
+                        (single - double).abs() <= bound,
+                        "{iterations} {inliers} {count} {size}: {single} {double}"
+                    );
+                }
+            }
+        }
+        assert_eq!(miss_probability::<f32>(1, 7, 7, 7), 0.0);
     }
 
     #[test]
