@@ -120,6 +120,22 @@ in_both_scalars! {
         assert!(iterations < 40 * 26, "{iterations}");
     }
 
+    /// A prior does no harm where the correspondences are far better than the threshold says.
+    fn a_prior_does_not_outweigh_good_correspondences<T>() {
+        let (mut plain, mut aided) = (0.0, 0.0);
+        for_each_case(40, |seed, rng| {
+            let problem = Scene::new(Motion::General, 100).noise_px(0.5).generate(seed);
+            let prior = gravity(&problem, 0.12 * DEGREE, 0.12 * DEGREE, rng);
+            for (prior, squares) in [(None, &mut plain), (Some(prior), &mut aided)] {
+                let mut options = options::<T>(prior);
+                options.max_error_px = lit(4.0);
+                let (estimate, _) = estimate_scene(&problem, &options).unwrap();
+                *squares += pose_error(&estimate.pose().expect("a volume"), &problem.pose).0.powi(2);
+            }
+        });
+        assert!(aided < 1.2 * plain, "{aided:e} {plain:e}");
+    }
+
     /// At most a third of the iterations at half outliers, and no worse.
     fn a_prior_saves_samples<T>() {
         let (mut iterations, mut auc) = ([0; 3], [0.0; 3]);

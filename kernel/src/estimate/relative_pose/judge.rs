@@ -47,6 +47,8 @@ pub(super) struct Refined<T: Real> {
     equations: NormalEquations<T, 5>,
     /// Where the loss ends.
     support: T,
+    /// Of a residual, against which a prior was weighed.
+    variance: T,
 }
 
 /// What a search has left to spend.
@@ -336,12 +338,20 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
 
     /// The pose that all inliers support, with what lies just beyond the threshold at a falling weight.
     pub(super) fn refine(&self, model: &PoseModel<T>, passes: u32) -> Refined<T> {
-        let support = self.support(&self.spread(model));
+        let seen = self.spread(model);
+        let support = self.support(&seen);
+        // A prior is weighed against the noise there is, lest it outweigh correspondences better than they are said to be.
+        let mut problem = *self.problem;
+        let mut variance = T::ZERO;
+        if let Some((_, said)) = &mut problem.prior {
+            *said = min(*said, seen.noise * seen.noise);
+            variance = *said;
+        }
         // The last step is worth three hundredths of a correspondence.
         let tolerance = max(lit::<T>(3e-2) / from_u32(self.problem.data.count as u32), lit(1e-5));
         let Minimum { model, equations, .. } =
-            self.problem.optimise(model, &Loss::Tukey(support), passes, tolerance);
-        Refined { model, equations, support }
+            problem.optimise(model, &Loss::Tukey(support), passes, tolerance);
+        Refined { model, equations, support, variance }
     }
 
     /// A pose refined from a caller's; none where too few agree with it to fix it. Writes the inlier mask.
@@ -365,9 +375,9 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     fn motion(&self, refined: &Refined<T>, spread: &Spread<T>) -> (GeneralMotion<T>, Option<PriorFit<T>>) {
         let (model, mut sums) = (&refined.model, refined.equations);
         let mut fit = None;
-        if let Some((known, variance)) = &self.problem.prior {
+        if let Some((known, _)) = &self.problem.prior {
             // What the correspondences say alone, by a Newton step.
-            known.add(&mut sums, &model.rotation, -*variance);
+            known.add(&mut sums, &model.rotation, -refined.variance);
             let gradient = sums.gradient;
             sums.gradient *= spread.bend;
             fit = known.agreement(&sums, &model.rotation, spread.variance);

@@ -94,10 +94,11 @@ pub type RelativePoseError = TwoViewError;
 ///
 /// With a [`RelativePosePrior`] the hypotheses come from three correspondences and the vertical, or from two and the
 /// rotation; each is polished on a few correspondences within a threshold as wide as the prior's uncertainty, and the
-/// prior is a weighted residual of every refinement. Then the prior is tested against what the same correspondences say
-/// without it (Wald's test at one in 10,000), and its consensus against a short search without it. A prior that fails is
-/// reported as [`PriorFit::Contradicted`](super::PriorFit), and the verdict is, bit for bit, that of the search without
-/// it with what is left of the budget.
+/// prior is a residual of every refinement, weighed against the option's sigma or, of the last one, the noise seen where
+/// that is less. Then the prior is tested against what the same correspondences say without it (Wald's test at one in
+/// 10,000), and its consensus against a short search without it. A prior that fails is reported as
+/// [`PriorFit::Contradicted`](super::PriorFit), and the verdict is, bit for bit, that of the search without it with what is
+/// left of the budget.
 ///
 /// # Input
 /// Cameras, and at least 5 pixels of each view, at most the workspace's capacity. A pixel that a lens model does not
