@@ -7,7 +7,7 @@ use crate::geometry::Essential;
 use crate::geometry::pose::nearest_rotation;
 use crate::linalg::vec3::{cross, dot};
 use crate::linalg::{LANES, Lanes, add_outer, times};
-use crate::real::{abs, from_u32, lit, sqrt};
+use crate::real::{abs, from_u32, lit, min, sqrt};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock};
 use crate::refine::homography::{RotationModel, transfer_sq};
 use crate::refine::lm::{
@@ -276,7 +276,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
             if sums.active < least {
                 return None;
             }
-            self.add_prior(&mut sums, &model);
+            self.add_prior(&mut sums, &model, T::MAX);
             let (step, promise) = sums.step(T::ZERO)?;
             model = model.retract(&step);
             if promise <= sums.cost * lit(CONVERGED) {
@@ -286,26 +286,28 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         Some(model)
     }
 
-    /// The model that minimises a loss, from `model`.
+    /// The model that minimises a loss, from `model`; `variance` is that of a residual.
     pub(super) fn optimise(
         &self,
         model: &PoseModel<T>,
         loss: &Loss<T>,
         passes: u32,
         tolerance: T,
+        variance: T,
     ) -> Minimum<PoseModel<T>, T, 5> {
         let equations = |model: &PoseModel<T>| {
             let mut sums = normal_equations(self.data, model, loss);
-            self.add_prior(&mut sums, model);
+            self.add_prior(&mut sums, model, variance);
             sums
         };
         descend(model, 5, passes, tolerance, equations, PoseModel::retract)
     }
 
-    /// Adds what is known of the rotation.
-    pub(super) fn add_prior(&self, sums: &mut NormalEquations<T, 5>, model: &PoseModel<T>) {
-        if let Some((known, variance)) = &self.prior {
-            known.add(sums, &model.rotation, *variance);
+    /// Adds what is known of the rotation, weighed against the variance of a residual where that is less than the one
+    /// assumed, lest it outweigh correspondences that are better than they are said to be.
+    fn add_prior(&self, sums: &mut NormalEquations<T, 5>, model: &PoseModel<T>, variance: T) {
+        if let Some((known, assumed)) = &self.prior {
+            known.add(sums, &model.rotation, min(*assumed, variance));
         }
     }
 }

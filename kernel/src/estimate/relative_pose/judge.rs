@@ -47,7 +47,7 @@ pub(super) struct Refined<T: Real> {
     equations: NormalEquations<T, 5>,
     /// Where the loss ends.
     support: T,
-    /// Of a residual, against which a prior was weighed.
+    /// Of a residual, against which a prior was weighed where it is less than the one assumed.
     variance: T,
 }
 
@@ -340,17 +340,11 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     pub(super) fn refine(&self, model: &PoseModel<T>, passes: u32) -> Refined<T> {
         let seen = self.spread(model);
         let support = self.support(&seen);
-        // A prior is weighed against the noise there is, lest it outweigh correspondences better than they are said to be.
-        let mut problem = *self.problem;
-        let mut variance = T::ZERO;
-        if let Some((_, said)) = &mut problem.prior {
-            *said = min(*said, seen.noise * seen.noise);
-            variance = *said;
-        }
+        let variance = seen.noise * seen.noise;
         // The last step is worth three hundredths of a correspondence.
         let tolerance = max(lit::<T>(3e-2) / from_u32(self.problem.data.count as u32), lit(1e-5));
         let Minimum { model, equations, .. } =
-            problem.optimise(model, &Loss::Tukey(support), passes, tolerance);
+            self.problem.optimise(model, &Loss::Tukey(support), passes, tolerance, variance);
         Refined { model, equations, support, variance }
     }
 
@@ -375,9 +369,9 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     fn motion(&self, refined: &Refined<T>, spread: &Spread<T>) -> (GeneralMotion<T>, Option<PriorFit<T>>) {
         let (model, mut sums) = (&refined.model, refined.equations);
         let mut fit = None;
-        if let Some((known, _)) = &self.problem.prior {
+        if let Some((known, variance)) = &self.problem.prior {
             // What the correspondences say alone, by a Newton step.
-            known.add(&mut sums, &model.rotation, -refined.variance);
+            known.add(&mut sums, &model.rotation, -min(*variance, refined.variance));
             let gradient = sums.gradient;
             sums.gradient *= spread.bend;
             fit = known.agreement(&sums, &model.rotation, spread.variance);
