@@ -124,6 +124,32 @@ in_both_scalars! {
         assert!(iterations[1] * 2 < iterations[0] || std::env::var("EPIPOLE_SEED").is_ok(), "{iterations:?}");
     }
 
+    /// A prior does no harm where the correspondences are far better than the threshold says, and the covariance knows.
+    fn a_prior_does_not_outweigh_good_correspondences<T>() {
+        let (mut plain, mut aided, mut predicted) = (0.0, 0.0, 0.0);
+        for_each_case(40, |seed, rng| {
+            let p = problem(Shape::Volume, 0.1, 0.2, seed);
+            let (pixels, points) = (p.pixels::<T>(), p.points::<T>());
+            let down = Vector3::new(0.0, 1.0, 0.2).normalize();
+            let tilt = down.cross(&rng.direction()).normalize() * (1e-3 * rng.normal());
+            let seen = p.pose.rotation * (epipole::nalgebra::UnitQuaternion::new(tilt) * down);
+            let gravity = GravityPrior { world: down.map(lit::<T>), camera: seen.map(lit), sigma_rad: lit(1e-3) };
+            for (gravity, squares) in [(None, &mut plain), (Some(gravity), &mut aided)] {
+                let mut options = options::<T>(4.0);
+                options.gravity = gravity;
+                let AbsolutePoseVerdict::Pose(found) = run(&pixels, &points, &options).verdict else { panic!("a volume") };
+                let error = rotation_error(&found.pose.rotation, &p.pose.rotation).powi(2);
+                *squares += error;
+                if gravity.is_some() {
+                    let covariance = found.covariance.expect("a volume").map(T::to_f64);
+                    predicted += covariance.fixed_view::<3, 3>(0, 0).trace();
+                }
+            }
+        });
+        assert!(aided < 1.1 * plain, "{aided:e} {plain:e}");
+        assert!(aided < 1.5 * predicted, "{aided:e} {predicted:e}");
+    }
+
     fn both_searches_of_a_prior_share_one_budget<T>() {
         for_each_case(10, |seed, _| {
             let p = problem(Shape::Volume, 1.0, 0.6, seed);

@@ -108,11 +108,18 @@ fn judged<T: Real, B: ReprojectionBlock<T>>(
         return estimate;
     };
     estimate.gravity = fit;
+    let truncated = Loss::Truncated(problem.threshold);
+    // A prior is weighed against the noise there is, lest it outweigh correspondences better than they are said to be.
+    let gravity = gravity.map(|gravity| {
+        let sums = problem.optimise(&model, &truncated, None, 1, T::ZERO).equations;
+        gravity.weighed(variance(task, problem, &sums))
+    });
+    let gravity = gravity.as_ref();
     // A pose where Tukey's loss is least, which no single correspondence at the threshold moves; its inliers' equations.
     let refined = |model: &CameraPose<T>, passes: u32| {
         let wide = Loss::Tukey(problem.threshold * T::TWO);
         let model = problem.optimise(model, &wide, gravity, passes, lit(1e-4)).model;
-        problem.optimise(&model, &Loss::Truncated(problem.threshold), gravity, 1, T::ZERO)
+        problem.optimise(&model, &truncated, gravity, 1, T::ZERO)
     };
     let best = refined(&model, 12);
     let mut entries = mask.iter_mut();

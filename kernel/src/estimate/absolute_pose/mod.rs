@@ -49,7 +49,8 @@ const NEEDED: usize = 4;
 ///
 /// # Accuracy
 /// That of a maximum-likelihood fit to the inliers (Tukey's loss, ending at two thresholds). Distortion is removed from the
-/// pixels beforehand; [`refine::absolute_pose`](crate::refine::absolute_pose) measures in the distorted image.
+/// pixels beforehand; [`refine::absolute_pose`](crate::refine::absolute_pose) measures in the distorted image. A gravity
+/// prior is weighed against the option's sigma or, where that is less, against the noise seen.
 ///
 /// # Cost
 /// Bounded by [`Budget`](crate::robust::Budget). With gravity the search by two correspondences takes as many samples as a

@@ -8,7 +8,7 @@ use super::hypothesis::{PoseProblem, UprightProblem};
 use super::options::GravityPrior;
 use crate::Real;
 use crate::geometry::pose::upright;
-use crate::real::{from_u32, is_finite, lit};
+use crate::real::{from_u32, is_finite, lit, min};
 use crate::refine::reprojection::{CameraPose, ReprojectionBlock};
 use crate::robust::budget::after;
 use crate::robust::{Consensus, Progress, RansacOptions, StopReason, iterations_needed, ransac};
@@ -35,6 +35,12 @@ impl<T: Real> Gravity<T> {
         let ratio = sigma_px / prior.sigma_rad;
         let direction = Direction::new(&prior.world, &prior.camera)?;
         Some(Self { direction, weight: ratio * ratio, sigma_rad: prior.sigma_rad })
+    }
+
+    /// The same prior weighed against another variance of an image coordinate, px^2, where that is less.
+    pub(super) fn weighed(&self, variance: T) -> Self {
+        let weight = variance / (self.sigma_rad * self.sigma_rad);
+        Self { weight: min(self.weight, weight), ..*self }
     }
 
     /// The angle between the two in standard deviations.
