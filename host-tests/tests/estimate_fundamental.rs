@@ -102,6 +102,21 @@ in_both_scalars! {
         });
     }
 
+    /// Without noise a sample's equations are dependent and its seven points have no finite number of matrices.
+    fn an_exact_plane_is_found_at_once<T>() {
+        for_each_case(20, |seed, _| {
+            let plane = Scene::new(Motion::General, N).shape(Shape::Plane);
+            for scene in [plane, Scene::new(Motion::PureRotation, N), Scene::new(Motion::Still, N)] {
+                for (outliers, most) in [(0.0, 20), (0.3, 200)] {
+                    let (x1, x2) = scene.outliers(outliers).generate(seed).pixels::<T>();
+                    let estimate = run(&x1, &x2, &options(1.0));
+                    assert!(matches!(estimate.verdict, FundamentalVerdict::Planar(_)), "{:?}", estimate.verdict);
+                    assert!(estimate.report.spent.iterations <= most, "{:?}", estimate.report);
+                }
+            }
+        });
+    }
+
     /// Three quarters of the inliers on a plane: seven of them seldom include the two off it that are needed.
     fn a_dominant_plane_does_not_mislead<T>() {
         share_of(30, |seed, _| {

@@ -13,7 +13,7 @@ use crate::refine::fundamental::FundamentalModel;
 use crate::refine::lm::{Minimum, minimise};
 use crate::robust::loss::Loss;
 use crate::robust::{Estimator, Gate, Score, ScoreCounts, Tally};
-use crate::solvers::relpose_7pt;
+use crate::solvers::{homography_4pt, relpose_7pt};
 
 /// Blocks scored between two looks at the gate.
 const CHUNK: usize = 2;
@@ -144,12 +144,21 @@ impl<T: Real> Estimator<T, 7> for EpipolarProblem<'_, T> {
             let Some((p, q)) = self.points(index) else { return false };
             (*a, *b) = (p, q);
         }
-        for f in &relpose_7pt(&x1, &x2) {
+        let solutions = relpose_7pt(&x1, &x2);
+        for f in &solutions {
             if let Some(model) = FundamentalModel::new(&f.0)
                 && oriented(&model, &x1, &x2)
             {
                 found(&model);
             }
+        }
+        // Without noise a plane's equations are dependent: any epipole goes with its homography.
+        if solutions.is_empty()
+            && let ([a1, b1, c1, d1, ..], [a2, b2, c2, d2, ..]) = (x1, x2)
+            && let Some(plane) = homography_4pt(&[a1, b1, c1, d1], &[a2, b2, c2, d2])
+            && let Some(model) = FundamentalModel::new(&(skew(&Vector3::<T>::x()) * plane.0))
+        {
+            found(&model);
         }
         true
     }
