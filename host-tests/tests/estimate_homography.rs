@@ -11,7 +11,7 @@ use epipole::robust::{Guide, OptionsError, StopReason};
 use epipole::{InputError, Real};
 use epipole_host_tests::scenes::{Motion, Scene, Shape, TwoView, calibration};
 use epipole_host_tests::tolerances::{ROBUST_EXACT_PX, ROBUST_SAME_PX};
-use epipole_host_tests::{for_each_case, in_both_scalars, share_of};
+use epipole_host_tests::{Rng, for_each_case, in_both_scalars, share_of};
 
 const N: usize = 200;
 
@@ -142,6 +142,41 @@ in_both_scalars! {
             assert_eq!(estimate.verdict, HomographyVerdict::NoConsensus);
             assert_eq!(estimate.report.inliers, 0);
         });
+    }
+
+    /// A hundred thousand samples find homographies that draw view 1 together, or into a cluster of view 2: of
+    /// clusters three in four met one where chance was the area of a disc.
+    fn wrong_matches_alone_have_no_homography<T>() {
+        for_each_case(12, |seed, rng| {
+            for (count, clusters) in [(50, 0), (N, 0), (N, 6)] {
+                let mut view = || {
+                    let anywhere = |rng: &mut Rng| Vector2::new(rng.range(0.0, 640.0), rng.range(0.0, 480.0));
+                    let centres: Vec<_> = (0..clusters).map(|_| anywhere(rng)).collect();
+                    let point = |_| match centres.get((rng.unit() * clusters as f64) as usize) {
+                        Some(centre) => centre + Vector2::new(rng.normal(), rng.normal()) * 25.0,
+                        None => anywhere(rng),
+                    };
+                    (0..count).map(point).map(|x| x.map(lit)).collect::<Vec<Vector2<T>>>()
+                };
+                let (x1, x2) = (view(), view());
+                let mut options = options::<T>(3.0);
+                options.ransac.seed = seed;
+                let estimate = run(&x1, &x2, &options);
+                assert!(matches!(estimate.verdict, HomographyVerdict::NoConsensus), "{:?}", estimate.verdict);
+            }
+        });
+    }
+
+    /// What is believed is not asked for more: fifteen of a hundred, thirty of two hundred.
+    fn a_few_true_matches_have_one<T>() {
+        share_of(20, |seed, _| {
+            [100, N].iter().all(|&count| {
+                let scene = Scene::new(Motion::General, count).shape(Shape::Plane).noise_px(0.8).outliers(0.85).generate(seed);
+                let (x1, x2) = scene.pixels::<T>();
+                let found = run(&x1, &x2, &options(3.0)).homography();
+                found.is_some_and(|found| farthest(&found, &truth(&scene), &scene) < 30.0)
+            })
+        }).assert_at_least(0.95);
     }
 
     fn few_correspondences_prove_nothing<T>() {

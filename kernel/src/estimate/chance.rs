@@ -7,7 +7,7 @@
 use crate::Real;
 use crate::linalg::{LANES, Lanes};
 use crate::real::{from_u32, lit, ln, max, min};
-use crate::refine::blocks::{BlockSlice, EpipolarBlock};
+use crate::refine::blocks::{BlockSlice, EpipolarBlock, PlaneBlock};
 use crate::robust::log_binomial_tail;
 
 /// Accidents expected at the most where something counts as proven.
@@ -32,6 +32,15 @@ fn ln_choose<T: Real>(n: u32, k: u32) -> T {
 #[cfg_attr(small, inline(never))]
 pub(super) fn beyond_chance<T: Real>(count: u32, agreeing: u32, freedom: u32, p: T) -> bool {
     ln_accidents(count, agreeing, freedom, p) < ln(lit(ACCIDENTS))
+}
+
+/// [`beyond_chance`] of the best of `tried` models.
+pub(super) fn best_beyond_chance<T: Real>(tried: u32, count: u32, agreeing: u32, freedom: u32, p: T) -> bool {
+    if agreeing <= freedom || count <= freedom {
+        return false;
+    }
+    let models = min(ln_choose::<T>(count, freedom), ln(from_u32(core::cmp::max(tried, 1))));
+    models + log_binomial_tail(count - freedom, agreeing - freedom, p) < ln(lit(ACCIDENTS))
 }
 
 /// ln of the expected number of accidents, of models fitted to `freedom` of `count` wrong correspondences, with which as
@@ -76,24 +85,26 @@ pub(super) fn point_accident<T: Real, B: EpipolarBlock<T>>(data: BlockSlice<'_, 
     if a * b > disc { disc / (a * b) } else { T::ONE }
 }
 
-/// The share of wrong correspondences that a model explains by accident, measured on the correspondences themselves with
-/// view 2 of another in place of their own; never below `least`. `squared` gives the squared errors of a block in units of
-/// the squared threshold.
-pub(super) fn measured_accident<T: Real, B: EpipolarBlock<T>>(
-    data: BlockSlice<'_, B>,
+/// The share of wrong correspondences that a model explains by accident, measured on the correspondences themselves, each
+/// with view 2 of so many `others` in place of its own; never below `least`. `squared` gives the squared errors of a block in
+/// units of the squared threshold.
+pub(super) fn measured_accident<T: Real>(
+    data: BlockSlice<'_, PlaneBlock<T>>,
     least: T,
-    squared: impl Fn(&B) -> Lanes<T>,
+    others: usize,
+    squared: impl Fn(&PlaneBlock<T>) -> Lanes<T>,
 ) -> T {
     let full = data.blocks.get(..data.count / LANES).unwrap_or(data.blocks);
     let (mut hits, mut seen) = (0u32, 0u32);
-    for shift in [full.len() / 2, full.len() / 3, full.len() / 5] {
-        // Blocks of the list and of the list turned by `shift`, but not a block with itself.
-        if shift == 0 {
-            continue;
-        }
-        let (start, end) = full.split_at_checked(shift).unwrap_or((full, &[]));
+    let turns = full.len() * LANES;
+    let others = core::cmp::min(others, turns.saturating_sub(1));
+    for k in 1..=others {
+        // The list and the list turned by some blocks and lanes, which is never a whole turn.
+        let turn = k * turns / (others + 1);
+        let (start, end) = full.split_at_checked(turn / LANES).unwrap_or((full, &[]));
         for (block, other) in full.iter().zip(end.iter().chain(start)) {
-            for s in squared(&block.mispaired(other)) {
+            let lanes = |row: &Lanes<T>| core::array::from_fn(|l| row[(l + turn) % LANES]);
+            for s in squared(&[block[0], block[1], lanes(&other[2]), lanes(&other[3])]) {
                 hits += (s < T::ONE) as u32;
             }
             seen += LANES as u32;

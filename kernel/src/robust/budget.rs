@@ -17,8 +17,8 @@ pub struct RansacOptions<T> {
     /// Iterations made at the least, so that one lucky sample does not end the run. Default 20. A relative pose with a prior
     /// makes fewer, of as many correspondences altogether.
     pub min_iterations: u32,
-    /// What the run may spend at the most. Default: 10,000 iterations, 100,000 where a sample takes five correspondences or
-    /// seven (a relative pose, a fundamental matrix); everything else unlimited.
+    /// What the run may spend at the most. Default: 10,000 iterations, 100,000 in options of two views' models (a
+    /// relative pose, a homography, a fundamental matrix); everything else unlimited.
     pub budget: Budget,
     /// Seed of the samples; the same seed and input give the same bits. Default 1.
     pub seed: u64,
@@ -29,7 +29,7 @@ pub struct RansacOptions<T> {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct Budget {
-    /// Samples drawn. Default 10,000; options of a relative pose and of a fundamental matrix: 100,000.
+    /// Samples drawn. Default 10,000; options of two views' models (relative pose, homography, fundamental matrix): 100,000.
     pub max_iterations: u32,
     /// Minimal problems solved (degenerate samples cost none). Default: no limit.
     pub max_solver_calls: u32,
@@ -63,8 +63,8 @@ impl<T: Real> Default for RansacOptions<T> {
 }
 
 impl<T: Real> RansacOptions<T> {
-    /// The defaults where a sample takes so many correspondences that 10,000 of them miss one of a fifth of inliers.
-    pub(crate) fn of_large_samples() -> Self {
+    /// The defaults of two views' models, of which 10,000 samples miss some that a twelfth (a homography) to a fifth agree with.
+    pub(crate) fn of_two_views() -> Self {
         Self { budget: Budget { max_iterations: 100_000, ..Budget::default() }, ..Self::default() }
     }
 

@@ -81,7 +81,7 @@ impl<T: Real> Judge<'_, '_, T> {
         let count = data.count as u32;
         let mut model = self.refine(best);
         let scale = self.problem.scale();
-        let accident = measured_accident(data, self.accident(), |block| {
+        let accident = measured_accident(data, self.accident(), 3, |block| {
             self.problem.squared(block, &model.matrix, scale)
         });
         let inliers = self.mark(&model, mask);

@@ -44,7 +44,7 @@ pub struct FundamentalOptions<T> {
 
 impl<T: Real> Default for FundamentalOptions<T> {
     fn default() -> Self {
-        Self { max_error_px: T::ONE, sigma_px: None, ransac: RansacOptions::of_large_samples() }
+        Self { max_error_px: T::ONE, sigma_px: None, ransac: RansacOptions::of_two_views() }
     }
 }
 

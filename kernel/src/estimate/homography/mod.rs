@@ -2,7 +2,7 @@
 
 use nalgebra::Vector2;
 
-use super::chance::{beyond_chance, measured_accident, point_accident};
+use super::chance::{best_beyond_chance, beyond_chance, measured_accident, point_accident};
 use super::degenerate::{few_distinct, few_repeated, list, mostly_on_a_line, on_a_line};
 use super::error::TwoViewError;
 use super::frame::PixelFrame;
@@ -52,7 +52,7 @@ pub struct HomographyOptions<T> {
 
 impl<T: Real> Default for HomographyOptions<T> {
     fn default() -> Self {
-        Self { max_error_px: lit(3.0), sigma_px: None, ransac: RansacOptions::default() }
+        Self { max_error_px: lit(3.0), sigma_px: None, ransac: RansacOptions::of_two_views() }
     }
 }
 
@@ -74,6 +74,9 @@ impl<T: Real> Default for HomographyOptions<T> {
 /// # Degeneracies
 /// All inliers on one line, or repetitions of fewer than four distinct points, but for as few as chance explains:
 /// [`HomographyVerdict::Unobservable`].
+/// Agreement that the best of as many hypotheses would meet by accident is no consensus. How often one agreement is an
+/// accident is measured on the correspondences, each with view 2 of others: so a homography that draws a view together,
+/// or that follows clusters, proves nothing.
 ///
 /// # Accuracy
 /// That of the maximum-likelihood estimate from the inliers to within a few percent. Coordinates are counted from the
@@ -86,8 +89,9 @@ impl<T: Real> Default for HomographyOptions<T> {
 /// # References
 /// M. Fischler, R. Bolles, "Random sample consensus", Communications of the ACM, 1981; O. Chum, T. Pajdla, P. Sturm, "The
 /// geometric error for homographies", Computer Vision and Image Understanding, 2005 (the error); P. Huber, "Robust
-/// Statistics", 1981, section
-/// 6.3 (the covariance of an M-estimate).
+/// Statistics", 1981, section 6.3 (the covariance of an M-estimate); L. Moisan, B. Stival, "A probabilistic criterion to
+/// detect rigid point matches between two images", IJCV 2004 (the number of accidents expected; deviation: one agreement's
+/// chance is measured, and models are counted as tried where those are fewer).
 ///
 /// # Examples
 /// ```
@@ -191,7 +195,8 @@ pub fn homography_guided<T: Real>(
     };
     let consensus = ransac(&problem, &options.ransac, order, LEAST_INLIERS, guide.keep_going);
     let mut report = consensus.report;
-    let judge = Judge { problem: &problem, sigma: sigma_px / frame.pixels, frame: &frame };
+    let sigma = sigma_px / frame.pixels;
+    let judge = Judge { problem: &problem, sigma, frame: &frame, tried: report.spent.hypotheses };
     let mask = workspace.inliers.get_mut(..count).unwrap_or_default();
     let (verdict, noise) = match &consensus.best {
         Some((model, _)) => judge.verdict(model, mask, workspace.order),
@@ -229,11 +234,18 @@ const DRAWN_AWAY: [f64; 2] = [8.0, 0.02];
 const NARROWER: f64 = 0.7;
 const NARROWED: u32 = 4;
 
+/// With how many others each correspondence is mispaired to measure what chance explains: at first, and where the verdict
+/// hangs on it.
+const MISPAIRED: usize = 3;
+const MISPAIRED_MORE: usize = 64;
+
 struct Judge<'a, 'b, T: Real> {
     problem: &'a TransferProblem<'b, T, PlaneBlock<T>>,
     /// Standard deviation of a coordinate in the blocks' unit, as the options have it.
     sigma: T,
     frame: &'a PixelFrame<T>,
+    /// Hypotheses that the search has looked at.
+    tried: u32,
 }
 
 impl<T: Real> Judge<'_, '_, T> {
@@ -299,8 +311,14 @@ impl<T: Real> Judge<'_, '_, T> {
             return (self.without_model(mask, order), T::ZERO);
         };
         let inliers = self.mark(&model, mask);
-        let accident = self.accident();
-        if !beyond_chance(data.count as u32, inliers, 4, accident) {
+        // A model that draws one view together explains more wrong ones than its discs do, and many samples find such.
+        let scale = T::ONE / (problem.threshold * problem.threshold);
+        let measured = |others: usize| {
+            measured_accident(data, self.accident(), others, |block| transfer_sq(&model.0, block, scale))
+        };
+        let proven = |p: T| best_beyond_chance(self.tried, data.count as u32, inliers, 4, p);
+        let coarse = measured(MISPAIRED);
+        if !proven(coarse) && !proven(measured(MISPAIRED_MORE)) {
             return (self.without_model(mask, order), T::ZERO);
         }
         let scatter = Scatter::new(data, &model, support);
@@ -308,13 +326,10 @@ impl<T: Real> Judge<'_, '_, T> {
         let sigma = max(self.sigma, noise);
         let indices = list(mask, order);
         // A homography through repeated points agrees with any pairing of them.
-        let scale = T::ONE / (problem.threshold * problem.threshold);
-        let mispaired =
-            measured_accident(data, accident, |block: &PlaneBlock<T>| transfer_sq(&model.0, block, scale));
-        if few_distinct(data, &mut indices.iter().copied(), 4, sigma, &|| mispaired) {
+        if few_distinct(data, &mut indices.iter().copied(), 4, sigma, &|| coarse) {
             return (HomographyVerdict::Unobservable(Unobservable::TooFewDistinct), noise);
         }
-        if on_a_line(data, indices, sigma, &|| accident) {
+        if on_a_line(data, indices, sigma, &|| self.accident()) {
             return (HomographyVerdict::Unobservable(Unobservable::Collinear), noise);
         }
         let Some(homography) = self.frame.homography(&model.0) else {

@@ -60,7 +60,7 @@ impl<T: Real> Default for RelativePoseOptions<T> {
             sigma_px: None,
             least_motion_px: None,
             prior: None,
-            ransac: RansacOptions::of_large_samples(),
+            ransac: RansacOptions::of_two_views(),
         }
     }
 }
