@@ -139,6 +139,58 @@ fn order_is_used<T: Real>() {
     });
 }
 
+/// Lines that are told apart, or not.
+struct Lines<T> {
+    line: Line<T>,
+    told_apart: bool,
+}
+
+impl<T: Real> Estimator<T, 2> for Lines<T> {
+    type Model = (T, T);
+    const DISCOVERIES: u32 = 2;
+    const RIVALLED_DISCOVERIES: u32 = 8;
+
+    fn count(&self) -> u32 {
+        self.line.count()
+    }
+
+    fn generate(&self, sample: &[u32; 2], found: &mut impl FnMut(&(T, T))) -> bool {
+        self.line.generate(sample, found)
+    }
+
+    fn score(&self, model: &(T, T), gate: &Gate<T>, counts: &mut ScoreCounts) -> Option<Score<T>> {
+        self.line.score(model, gate, counts)
+    }
+
+    fn refine(&self, model: &(T, T), residuals: &mut u64) -> Option<(T, T)> {
+        self.line.refine(model, residuals)
+    }
+
+    fn differs(&self, a: &(T, T), b: &(T, T)) -> bool {
+        self.told_apart && (a.0 - b.0).to_f64().abs() > 0.5
+    }
+}
+
+/// Of two lines of which one has a point more, a search that tells them apart lasts longer and finds none that is worse.
+fn a_rival_prolongs_the_search<T: Real>() {
+    let (mut cases, mut longer) = (0, 0);
+    for_each_case(50, |_, rng| {
+        let mut line = Line::<T>::new(rng, 31, 80);
+        line.points.extend((0..30).map(|_| {
+            let x = rng.range(-5.0, 5.0);
+            (lit(x), lit(-0.5 * x - 1.0 + 0.01 * rng.normal()))
+        }));
+        let mut lines = Lines { line, told_apart: false };
+        let once = ransac(&lines, &RansacOptions::default(), None, 5, None).report;
+        lines.told_apart = true;
+        let rivalled = ransac(&lines, &RansacOptions::default(), None, 5, None).report;
+        assert!(rivalled.spent.iterations >= once.spent.iterations && rivalled.cost <= once.cost);
+        cases += 1;
+        longer += (rivalled.spent.iterations > once.spent.iterations) as u32;
+    });
+    assert!(longer > 0 || cases < 10);
+}
+
 fn probabilities<T: Real>() {
     assert_eq!(probability_of_inlier_sample::<T>(10, 10, 5), T::ONE);
     assert_eq!(iterations_needed::<T>(lit(0.99), 3, 100, 5), u32::MAX);
@@ -158,7 +210,13 @@ macro_rules! both {
         mod f64 { $(#[test] fn $name() { super::$name::<f64>() })* }
     };
 }
-both!(engine_finds_the_line, engine_obeys_its_limits, order_is_used, probabilities);
+both!(
+    engine_finds_the_line,
+    engine_obeys_its_limits,
+    order_is_used,
+    a_rival_prolongs_the_search,
+    probabilities
+);
 
 /// Outlier share x number x scene: how many of ten problems end in the right verdict with a pose within 5 degrees, and
 /// the iterations spent, as a committed table. `EPIPOLE_UPDATE_GOLDEN=1` writes it anew, on purpose.

@@ -20,8 +20,12 @@ pub trait Estimator<T: Real, const S: usize> {
 
     /// How many local optimisations must have led to the best optimum for a run to end with the samples that one of
     /// inliers only takes: more than one where samples of noisy inliers lead to different optima. Half as many, rounded up,
-    /// do where most correspondences agree with the best one and nothing rivals it.
+    /// do where most correspondences agree with the best one.
     const DISCOVERIES: u32 = 1;
+
+    /// The same where an optimum that [differs](Self::differs) from the best scores almost as well: samples of either may
+    /// be the rarer ones, and it takes more of them to know which is best.
+    const RIVALLED_DISCOVERIES: u32 = Self::DISCOVERIES;
 
     /// Residuals of one correspondence that [`polish`](Self::polish) and [`score`](Self::score) together evaluate at the
     /// most, for one hypothesis.
@@ -58,6 +62,11 @@ pub trait Estimator<T: Real, const S: usize> {
     /// inliers of a tight one reaches less far.
     fn leads_back(&self, _model: &Self::Model, _best: &Self::Model) -> bool {
         false
+    }
+
+    /// True where two optima are different solutions, not one and the same that was reached more and less exactly.
+    fn differs(&self, _optimum: &Self::Model, _other: &Self::Model) -> bool {
+        true
     }
 
     /// True where more samples would lead to a model that is no better than this one, the best so far, for what all of

@@ -13,15 +13,14 @@ use crate::real::{abs, from_u32, lit, max, min};
 const SLACK: f64 = 0.7;
 /// Where the best minimal model explains no more than chance, one in as many near misses is optimised.
 const DOUBTFUL: u32 = 8;
-/// Until the best optimum has been met [`Estimator::DISCOVERIES`] times (half as many where most agree with it and nothing
-/// rivals it), the run lasts so many times as long.
-const PATIENCE: u32 = 5;
+/// Until the best optimum has been met as often as is wanted, the run lasts so many times as long, and this much longer.
+const PATIENCE: u32 = 2;
 /// Optima whose costs differ by less than this share of the correspondences count as the same one; where most agree, also
 /// those that differ by less than one correspondence.
 const SAME_OPTIMUM: f64 = 0.003;
 
 /// Another optimum is a rival where what it explains less than the best is smaller than this share.
-const RIVAL: f64 = 0.05;
+const RIVAL: f64 = 0.1;
 
 /// What a run found, and how it went.
 #[derive(Clone, Copy, Debug)]
@@ -38,8 +37,9 @@ pub struct Consensus<M, T> {
 /// The best hypothesis of a sample is optimised locally where it comes near the best minimal model so far (more rarely
 /// until that one explains more than chance); the run
 /// ends once samples enough for the inliers of the best optimised model have been drawn. Where samples lead to different
-/// optima, one sample of inliers is not enough: until [`Estimator::DISCOVERIES`] of them have led to the best one (half as
-/// many where most correspondences agree with it and no other optimum came near), five times as many samples are asked
+/// optima, one sample of inliers is not enough: until [`Estimator::DISCOVERIES`] of them have led to the best one
+/// ([`Estimator::RIVALLED_DISCOVERIES`] where another solution came near; half as many where most correspondences agree with
+/// the best), so many times as many samples, and as many again twice, are asked
 /// for. With an order, ranked and uniform samples alternate: the best ranked ones may lie close together.
 ///
 /// # Input
@@ -115,6 +115,7 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
     let (count, size) = (estimator.count(), S as u32);
     let manners = Manners {
         discoveries: E::DISCOVERIES,
+        rivalled_discoveries: E::RIVALLED_DISCOVERIES,
         near_misses: E::NEAR_MISSES,
         near_miss_interval: E::NEAR_MISS_INTERVAL,
         score_passes: E::SCORE_PASSES,
@@ -160,18 +161,18 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
             }
             search.add_up();
         }
-        let former = best.map(|(_, score)| score);
-        let leads = former.is_none_or(|former| candidate.1.cost < former.cost);
+        let former = best.map(|(model, score)| (score, estimator.differs(&candidate.0, &model)));
+        let leads = former.is_none_or(|(former, _)| candidate.1.cost < former.cost);
         if leads {
             if estimator.reject(&candidate.0) {
                 continue;
             }
             best = Some(candidate);
         }
-        search.has_found(&candidate.1, former.as_ref());
+        search.has_found(&candidate.1, former);
         if leads && search.discoveries < search.wanted() {
             if estimator.settles(&candidate.0, &mut search.refined_residuals) {
-                search.discoveries = E::DISCOVERIES;
+                search.discoveries = u32::MAX;
             }
             search.add_up();
         }
@@ -182,6 +183,7 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
 /// An estimator's constants.
 struct Manners {
     discoveries: u32,
+    rivalled_discoveries: u32,
     near_misses: u32,
     near_miss_interval: u32,
     score_passes: u32,
@@ -260,7 +262,7 @@ impl<'a, T: Real> Search<'a, T> {
         if spent.iterations >= budget.max_iterations {
             return false;
         }
-        let patience = if self.discoveries < wanted { PATIENCE } else { 1 };
+        let patience = if self.discoveries < wanted { wanted.saturating_add(PATIENCE) } else { 1 };
         if spent.iterations
             >= core::cmp::max(self.needed.saturating_mul(patience), self.options.min_iterations)
         {
@@ -330,31 +332,32 @@ impl<'a, T: Real> Search<'a, T> {
 
     /// How many discoveries of the best optimum end a run.
     fn wanted(&self) -> u32 {
-        let clear = !self.rivalled && self.most_agree();
-        if clear { self.manners.discoveries.div_ceil(2) } else { self.manners.discoveries }
+        let manners = &self.manners;
+        let wanted = if self.rivalled { manners.rivalled_discoveries } else { manners.discoveries };
+        if self.most_agree() { wanted.div_ceil(2) } else { wanted }
     }
 
     fn add_up(&mut self) {
         self.spent.residuals = self.counts.residuals + self.refined_residuals;
     }
 
-    /// After another optimum has been found; `best` is the best one before.
-    fn has_found(&mut self, score: &Score<T>, best: Option<&Score<T>>) {
+    /// After another optimum has been found; `former` is the best one before, and whether the two are different solutions.
+    fn has_found(&mut self, score: &Score<T>, former: Option<(Score<T>, bool)>) {
         let all = from_u32::<T>(self.count);
         let mut same = all * lit(SAME_OPTIMUM);
         if self.most_agree() {
             same = max(same, T::ONE);
         }
-        if let Some(best) = best {
+        if let Some((best, differs)) = former {
             let gap = abs(score.cost - best.cost);
-            self.rivalled |= gap > same && gap < (all - min(score.cost, best.cost)) * lit(RIVAL);
+            self.rivalled |= differs && gap > same && gap < (all - min(score.cost, best.cost)) * lit(RIVAL);
         }
-        self.discoveries = match best {
-            Some(best) if score.cost > best.cost + same => self.discoveries,
-            Some(best) if score.cost > best.cost - same => self.discoveries + 1,
+        self.discoveries = match former {
+            Some((best, _)) if score.cost > best.cost + same => self.discoveries,
+            Some((best, _)) if score.cost > best.cost - same => self.discoveries.saturating_add(1),
             _ => 1,
         };
-        if best.is_none_or(|best| score.cost < best.cost) {
+        if former.is_none_or(|(best, _)| score.cost < best.cost) {
             self.spent.inliers = score.inliers;
             self.needed = iterations_needed(self.options.confidence, score.inliers, self.count, self.size);
             let inliers = core::cmp::max(self.least_inliers, self.minimal.inliers);
