@@ -150,6 +150,33 @@ in_both_scalars! {
         assert!(aided < 1.5 * predicted, "{aided:e} {predicted:e}");
     }
 
+    /// A pose that takes one cluster of points to one of pixels has inliers by chance: of such scenes one in four had a pose
+    /// where chance was the area of a disc.
+    fn clusters_matched_wrongly_have_no_pose<T>() {
+        share_of(30, |seed, rng| {
+            let clusters: Vec<_> = (0..6).map(|_| (Vector2::new(rng.range(0.0, 640.0), rng.range(0.0, 480.0)), rng.normal3() * 4.0)).collect();
+            let pixels: Vec<Vector2<T>> = (0..N)
+                .map(|_| (clusters[rng.index(6)].0 + Vector2::new(rng.normal(), rng.normal()) * 25.0).map(lit))
+                .collect();
+            let points: Vec<Vector3<T>> = (0..N).map(|_| (clusters[rng.index(6)].1 + rng.normal3() * 0.3).map(lit)).collect();
+            let mut options = options::<T>(4.0);
+            options.ransac.seed = seed;
+            run(&pixels, &points, &options).pose().is_none()
+        }).assert_at_least(0.96);
+    }
+
+    /// What is believed is not asked for more: eight of ten, and six without a wrong one among them.
+    fn a_few_right_matches_have_a_pose<T>() {
+        share_of(30, |seed, _| {
+            [(6, 0.0), (10, 0.2), (50, 0.8)].iter().all(|&(count, outliers)| {
+                let scene = Scene::new(Motion::General, count).noise_px(1.0).outliers(outliers);
+                let p = AbsoluteScene::generate(&scene, seed);
+                let pose = run::<T>(&p.pixels(), &p.points(), &options(4.0)).pose();
+                pose.is_some_and(|pose| rotation_error(&pose.rotation, &p.pose.rotation) < 0.05)
+            })
+        }).assert_at_least(0.96);
+    }
+
     fn both_searches_of_a_prior_share_one_budget<T>() {
         for_each_case(10, |seed, _| {
             let p = problem(Shape::Volume, 1.0, 0.6, seed);

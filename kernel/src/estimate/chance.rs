@@ -7,7 +7,7 @@
 use crate::Real;
 use crate::linalg::{LANES, Lanes};
 use crate::real::{from_u32, lit, ln, max, min};
-use crate::refine::blocks::{BlockSlice, EpipolarBlock, PlaneBlock};
+use crate::refine::blocks::{Block, BlockSlice, EpipolarBlock};
 use crate::robust::log_binomial_tail;
 
 /// Accidents expected at the most where something counts as proven.
@@ -86,13 +86,15 @@ pub(super) fn point_accident<T: Real, B: EpipolarBlock<T>>(data: BlockSlice<'_, 
 }
 
 /// The share of wrong correspondences that a model explains by accident, measured on the correspondences themselves, each
-/// with view 2 of so many `others` in place of its own; never below `least`. `squared` gives the squared errors of a block in
-/// units of the squared threshold.
-pub(super) fn measured_accident<T: Real>(
-    data: BlockSlice<'_, PlaneBlock<T>>,
+/// with one half of so many `others` in place of its own; never below `least`. `squared` gives the squared errors of a block
+/// that gets that half from another, in units of the squared threshold. So many accidents are added as `unseen`, where the
+/// pairs are too few to do without.
+pub(super) fn measured_accident<T: Real, B: Block<T>>(
+    data: BlockSlice<'_, B>,
     least: T,
     others: usize,
-    squared: impl Fn(&PlaneBlock<T>) -> Lanes<T>,
+    unseen: u32,
+    squared: impl Fn(&B, &B) -> Lanes<T>,
 ) -> T {
     let full = data.blocks.get(..data.count / LANES).unwrap_or(data.blocks);
     let (mut hits, mut seen) = (0u32, 0u32);
@@ -103,14 +105,13 @@ pub(super) fn measured_accident<T: Real>(
         let turn = k * turns / (others + 1);
         let (start, end) = full.split_at_checked(turn / LANES).unwrap_or((full, &[]));
         for (block, other) in full.iter().zip(end.iter().chain(start)) {
-            let lanes = |row: &Lanes<T>| core::array::from_fn(|l| row[(l + turn) % LANES]);
-            for s in squared(&[block[0], block[1], lanes(&other[2]), lanes(&other[3])]) {
+            for s in squared(block, &other.turned(turn)) {
                 hits += (s < T::ONE) as u32;
             }
             seen += LANES as u32;
         }
     }
-    let share = from_u32::<T>(hits + 2) / from_u32(seen + 2);
+    let share = from_u32::<T>(hits + unseen) / from_u32(seen + unseen);
     if seen > 0 && share > least { share } else { least }
 }
 

@@ -26,6 +26,9 @@ pub(crate) trait Block<T: Real>: Copy {
 
     /// Writes the numbers of one correspondence.
     fn write_lane(&mut self, to: usize, numbers: &[T]);
+
+    /// The same correspondences, each so many lanes before its place.
+    fn turned(&self, by: usize) -> Self;
 }
 
 impl<T: Real, const W: usize> Block<T> for [Lanes<T>; W] {
@@ -58,6 +61,10 @@ impl<T: Real, const W: usize> Block<T> for [Lanes<T>; W] {
                 *entry = value;
             }
         }
+    }
+
+    fn turned(&self, by: usize) -> Self {
+        self.map(|lanes| core::array::from_fn(|l| lanes[(l + by) % LANES]))
     }
 }
 

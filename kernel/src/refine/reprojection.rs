@@ -58,6 +58,9 @@ pub(crate) trait ReprojectionBlock<T: Real>: Block<T> {
 
     /// The rows a, b, c of a lane.
     fn rows(&self, lane: usize, focal: [T; 2]) -> [[T; 3]; 3];
+
+    /// The pixels of these correspondences with the points of others: wrong correspondences.
+    fn mispaired(&self, other: &Self) -> Self;
 }
 
 /// u, v, then X, Y, Z of the world point.
@@ -87,6 +90,10 @@ impl<T: Real> ReprojectionBlock<T> for PlanePointBlock<T> {
         let zero = T::ZERO;
         [[focal[0], zero, -self[0][l]], [zero, focal[1], -self[1][l]], [zero, zero, T::ONE]]
     }
+
+    fn mispaired(&self, other: &Self) -> Self {
+        [self[0], self[1], other[2], other[3], other[4]]
+    }
 }
 
 impl<T: Real> ReprojectionBlock<T> for BearingPointBlock<T> {
@@ -114,6 +121,12 @@ impl<T: Real> ReprojectionBlock<T> for BearingPointBlock<T> {
             rows[k] = [self[3 * k][l], self[3 * k + 1][l], self[3 * k + 2][l]];
         }
         rows
+    }
+
+    fn mispaired(&self, other: &Self) -> Self {
+        let mut block = *self;
+        (block[9], block[10], block[11]) = (other[9], other[10], other[11]);
+        block
     }
 }
 

@@ -60,7 +60,7 @@ impl<'a, T: Real, B: ReprojectionBlock<T>> PoseProblem<'a, T, B> {
     /// Squared residuals of a block in units of the squared threshold; of a point behind the camera, 1.
     #[cfg_attr(not(small), inline)]
     #[cfg_attr(small, inline(never))]
-    fn relative(&self, block: &B, pose: &CameraPose<T>, scale: T) -> Lanes<T> {
+    pub(super) fn relative(&self, block: &B, pose: &CameraPose<T>, scale: T) -> Lanes<T> {
         let (square, depth) = squared(block, pose, self.focal);
         let mut relative = [T::ZERO; LANES];
         for l in 0..LANES {
@@ -71,7 +71,7 @@ impl<'a, T: Real, B: ReprojectionBlock<T>> PoseProblem<'a, T, B> {
         relative
     }
 
-    fn scale(&self) -> T {
+    pub(super) fn scale(&self) -> T {
         T::ONE / (self.threshold * self.threshold)
     }
 

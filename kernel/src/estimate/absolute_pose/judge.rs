@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Matrix6, Translation3, Vector3};
 
 use super::super::Unobservable;
+use super::super::chance::measured_accident;
 use super::super::prior::PriorFit;
 use super::NEEDED;
 use super::hypothesis::PoseProblem;
@@ -19,13 +20,18 @@ use crate::refine::blocks::BlockSlice;
 use crate::refine::lm::NormalEquations;
 use crate::refine::reprojection::{CameraPose, ReprojectionBlock};
 use crate::robust::loss::Loss;
-use crate::robust::{Consensus, Guide, iterations_needed, log_binomial_tail, rank_by_score, ransac};
+use crate::robust::{
+    Consensus, Guide, RansacReport, iterations_needed, log_binomial_tail, rank_by_score, ransac,
+};
 use crate::{Real, Solutions};
 
 /// A second pose of a plane is told from the first if it is this much less likely (the logarithm of 100).
 const LOG_ODDS: f64 = 4.6;
 /// A consensus is believed if chance makes one like it with less than this probability (the logarithm of 5 %).
 const LOG_CHANCE: f64 = -3.0;
+/// What chance explains may be so much before it is measured, on each pixel with the points of so many others.
+const LARGE_ACCIDENT: f64 = 0.3;
+const MISPAIRED: usize = 64;
 /// Samples drawn at the most to find out that the points lie behind the camera.
 const MAX_BEHIND: u32 = 300;
 
@@ -94,7 +100,7 @@ fn judged<T: Real, B: ReprojectionBlock<T>>(
         report: consensus.report,
     };
     let found = consensus.best.map(|(model, _)| model);
-    let believed = found.filter(|_| beyond_chance(task, problem, consensus));
+    let believed = found.filter(|model| beyond_chance(task, problem, model, &consensus.report));
     // Points behind the camera show a depth-reversed shape that a part of them fits in front, too.
     let few = 2 * consensus.report.inliers < count as u32;
     if few && behind_camera(task, problem, consensus) {
@@ -165,13 +171,13 @@ fn judged<T: Real, B: ReprojectionBlock<T>>(
     estimate
 }
 
-/// True where the consensus is larger than what wrong correspondences make up.
+/// True where a pose has more inliers than the best of as many poses of wrong correspondences.
 fn beyond_chance<T: Real, B: ReprojectionBlock<T>>(
     task: &Task<'_, T>,
     problem: &PoseProblem<'_, T, B>,
-    consensus: &Consensus<CameraPose<T>, T>,
+    model: &CameraPose<T>,
+    report: &RansacReport<T>,
 ) -> bool {
-    let report = &consensus.report;
     if (report.inliers as usize) < NEEDED {
         return false;
     }
@@ -186,10 +192,20 @@ fn beyond_chance<T: Real, B: ReprojectionBlock<T>>(
         }
     });
     let radius = task.options.max_error_px / max(extent, task.options.max_error_px * T::TWO);
-    let chance = radius * radius;
-    let tried = from_u32::<T>(core::cmp::max(report.spent.hypotheses, 1));
-    let tail = log_binomial_tail(problem.data.count as u32 - 3, report.inliers - 3, chance);
-    ln(tried) + tail < lit(LOG_CHANCE)
+    let disc = radius * radius;
+    let tried = ln(from_u32::<T>(core::cmp::max(report.spent.hypotheses, 1)));
+    let proven = |chance: T| {
+        tried + log_binomial_tail(problem.data.count as u32 - 3, report.inliers - 3, chance) < lit(LOG_CHANCE)
+    };
+    // A pose that draws the points together, or a cluster of them to one of pixels, meets more than its disc's share:
+    // measured where it matters.
+    let scale = problem.scale();
+    let measured = || {
+        measured_accident(problem.data, disc, MISPAIRED, 0, |block, other| {
+            problem.relative(&block.mispaired(other), model, scale)
+        })
+    };
+    proven(max(disc, lit(LARGE_ACCIDENT))) || proven(measured())
 }
 
 /// True where poses with the points behind the camera find a consensus twice as large as the one in front.
@@ -207,7 +223,8 @@ fn behind_camera<T: Real, B: ReprojectionBlock<T>>(
     let spent = in_front.report.spent.iterations;
     options.budget.max_iterations = core::cmp::min(spent, core::cmp::min(needed, MAX_BEHIND));
     let behind = ransac::<T, _, 3>(&mirrored, &options, None, wanted, None);
-    behind.report.inliers >= wanted && beyond_chance(task, &mirrored, &behind)
+    behind.report.inliers >= wanted
+        && behind.best.is_some_and(|(model, _)| beyond_chance(task, &mirrored, &model, &behind.report))
 }
 
 /// The sum of the inliers' squared residuals, px^2.

@@ -45,7 +45,8 @@ const NEEDED: usize = 4;
 ///
 /// # Degeneracies
 /// Inliers on a line or on fewer than four distinct points: `Unobservable`. On a plane far away or small, two poses fit
-/// alike: `PlanarAmbiguity` with both. Points that fit only behind the camera: `BehindCamera`.
+/// alike: `PlanarAmbiguity` with both. Points that fit only behind the camera: `BehindCamera`. Agreement that the best of as
+/// many hypotheses would meet by accident (measured on the pixels with the points of others) is no consensus.
 ///
 /// # Accuracy
 /// That of a maximum-likelihood fit to the inliers (Tukey's loss, ending at two thresholds). Distortion is removed from the

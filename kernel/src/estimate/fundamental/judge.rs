@@ -9,6 +9,7 @@ use crate::estimate::degenerate::{few_distinct, few_repeated, list, mostly_on_a_
 use crate::estimate::frame::PixelFrame;
 use crate::estimate::transfer::TransferProblem;
 use crate::real::{from_u32, lit, max, sqrt};
+use crate::refine::blocks::EpipolarBlock;
 use crate::refine::fundamental::FundamentalModel;
 use crate::refine::homography::{HomographyModel, transfer_sq};
 use crate::robust::loss::Loss;
@@ -81,8 +82,8 @@ impl<T: Real> Judge<'_, '_, T> {
         let count = data.count as u32;
         let mut model = self.refine(best);
         let scale = self.problem.scale();
-        let accident = measured_accident(data, self.accident(), 3, |block| {
-            self.problem.squared(block, &model.matrix, scale)
+        let accident = measured_accident(data, self.accident(), 3, 2, |block, other| {
+            self.problem.squared(&block.mispaired(other), &model.matrix, scale)
         });
         let inliers = self.mark(&model, mask);
         if !beyond_chance(count, inliers, 7, accident) {

@@ -14,7 +14,7 @@ use super::workspace::{TwoViewStorage, TwoViewWorkspace};
 use crate::Real;
 use crate::linalg::LANES;
 use crate::real::{from_u32, lit, max, min, sqrt};
-use crate::refine::blocks::{Block, BlockSlice, PlaneBlock};
+use crate::refine::blocks::{Block, BlockSlice, EpipolarBlock, PlaneBlock};
 use crate::refine::homography::{HomographyModel, transfer_sq};
 use crate::robust::budget::check_noise;
 use crate::robust::loss::Loss;
@@ -313,12 +313,14 @@ impl<T: Real> Judge<'_, '_, T> {
         let inliers = self.mark(&model, mask);
         // A model that draws one view together explains more wrong ones than its discs do, and many samples find such.
         let scale = T::ONE / (problem.threshold * problem.threshold);
-        let measured = |others: usize| {
-            measured_accident(data, self.accident(), others, |block| transfer_sq(&model.0, block, scale))
+        let measured = |others: usize, unseen: u32| {
+            measured_accident(data, self.accident(), others, unseen, |block, other| {
+                transfer_sq(&model.0, &block.mispaired(other), scale)
+            })
         };
         let proven = |p: T| best_beyond_chance(self.tried, data.count as u32, inliers, 4, p);
-        let coarse = measured(MISPAIRED);
-        if !proven(coarse) && !proven(measured(MISPAIRED_MORE)) {
+        let coarse = measured(MISPAIRED, 2);
+        if !proven(coarse) && !proven(measured(MISPAIRED_MORE, 0)) {
             return (self.without_model(mask, order), T::ZERO);
         }
         let scatter = Scatter::new(data, &model, support);
