@@ -230,14 +230,14 @@ impl<T: Real, const P: usize> Sums<T, P> {
         let (mut active, mut seen) = (0u32, 0usize);
         let none = Row { c: T::ZERO, inverse: T::ZERO, j: [T::ZERO; P] };
         // Those that wait for a lane each, and after them those of a block.
-        let mut rows = [none; 2 * LANES];
+        let mut rows = [[none; LANES]; 2];
         let mut waiting = 0usize;
         let mut left = data.count;
         for block in data.blocks.iter().step_by(step) {
             let mut end = waiting;
             for l in 0..LANES {
                 if l < left && M::inside(frame, block, l, limit) {
-                    if let Some(place) = rows.get_mut(end) {
+                    if let Some(place) = rows.as_flattened_mut().get_mut(end) {
                         *place = M::row(frame, block, l);
                     }
                     end += 1;
@@ -248,26 +248,22 @@ impl<T: Real, const P: usize> Sums<T, P> {
             active += (end - waiting) as u32;
             if end - waiting == LANES {
                 // A full block does not wait.
-                if let Some(full) = rows.get(waiting..).and_then(|rows| rows.first_chunk()) {
+                if let Some(full) = rows.as_flattened().get(waiting..).and_then(|rows| rows.first_chunk()) {
                     self.add_rows(full, LANES, loss);
                 }
                 continue;
             }
             waiting = end;
             if let Some(over) = end.checked_sub(LANES) {
-                let (full, rest) = rows.split_at_mut(LANES);
-                if let Some(full) = full.first_chunk() {
-                    self.add_rows(full, LANES, loss);
-                }
-                for (place, row) in full.iter_mut().zip(rest).take(over) {
-                    *place = *row;
-                }
+                let [full, rest] = &mut rows;
+                self.add_rows(full, LANES, loss);
+                // Two at the most, for neither those that waited nor those of the block were four. Both, for a copy of so
+                // many would link `memmove`.
+                (full[0], full[1]) = (rest[0], rest[1]);
                 waiting = over;
             }
         }
-        if let Some(rest) = rows.first_chunk() {
-            self.add_rows(rest, waiting, loss);
-        }
+        self.add_rows(&rows[0], waiting, loss);
         (active, seen)
     }
 }
