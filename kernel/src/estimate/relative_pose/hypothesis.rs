@@ -20,6 +20,7 @@ use crate::solvers::relpose_5pt;
 
 use super::super::chance::EXPLAINED_SIGMAS;
 use super::super::stride;
+use super::planar::exchange_two;
 use super::prior::RotationPrior;
 
 /// Correspondences and what a score of them needs.
@@ -345,12 +346,8 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
         let mut f1 = [Vector3::zeros(); 5];
         let mut f2 = [Vector3::zeros(); 5];
         let mut sample = *sample;
-        let off = self.off_plane;
-        if off.len() > 1 {
-            for index in sample.iter_mut().skip(3) {
-                let Some(&other) = off.get(*index as usize % off.len()) else { return false };
-                *index = other;
-            }
+        if self.off_plane.len() > 1 {
+            exchange_two(&mut sample, self.off_plane);
         }
         for ((a, b), &index) in f1.iter_mut().zip(&mut f2).zip(&sample) {
             let Some((x, y)) = self.directions(index) else { return false };

@@ -286,3 +286,45 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         }
     }
 }
+
+/// Two of a sample, whose numbers rise, give way to two others of a list, all as likely.
+#[cfg_attr(small, inline)]
+pub(super) fn exchange_two(sample: &mut [u32; 5], others: &[u32]) {
+    let key = sample.iter().fold(0, |key: u32, &index| key.wrapping_mul(0x9e37_79b9).wrapping_add(index));
+    let pair =
+        |seed: u64, count: u32| Sampler::<f32>::uniform(seed, count).sample::<2>(key).unwrap_or_default();
+    for (place, other) in pair(0, 5).into_iter().zip(pair(1, others.len() as u32)) {
+        if let (Some(index), Some(&other)) = (sample.get_mut(place as usize), others.get(other as usize)) {
+            *index = other;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of 120 numbers 40 stand in the list: how often each of the two kinds is in a sample does not depend on its place.
+    #[test]
+    fn two_of_a_sample_are_exchanged_evenly() {
+        let others: [u32; 40] = core::array::from_fn(|k| 1000 + k as u32);
+        let (mut kept, mut taken) = ([0u32; 120], [0u32; 40]);
+        let draws = 40_000;
+        for k in 0..draws {
+            let mut sample = Sampler::<f32>::uniform(3, 120).sample::<5>(k).expect("120 are enough");
+            exchange_two(&mut sample, &others);
+            for index in sample {
+                match index.checked_sub(1000) {
+                    Some(other) => taken[other as usize] += 1,
+                    None => kept[index as usize] += 1,
+                }
+            }
+        }
+        for (counts, expected) in [(&kept[..], 3.0 / 120.0), (&taken[..], 2.0 / 40.0)] {
+            let expected = expected * draws as f64;
+            for &count in counts {
+                assert!((count as f64 - expected).abs() < 5.0 * expected.sqrt(), "{count} {expected}");
+            }
+        }
+    }
+}
