@@ -144,7 +144,7 @@ in_both_scalars! {
             FundamentalVerdict::Unobservable(why) => why == Unobservable::Collinear,
             other => panic!("{other:?}"),
         }).assert_at_least(0.8);
-        for distinct in [1, 2, 3, 5] {
+        for distinct in [1, 2, 3, 5, 7] {
             let few = FundamentalVerdict::Unobservable(Unobservable::TooFewDistinct);
             share_of(30, |seed, _| match verdict(Shape::Repeated(distinct), seed) {
                 FundamentalVerdict::Found(_) => panic!("{distinct} points have no fundamental matrix"),

@@ -44,7 +44,7 @@ fn recovers_general_motion<T: Real>() {
 /// The right verdict on every seed, never a general pose.
 fn degenerate_scenes<T: Real>() {
     type Right<T> = fn(&RelativePoseVerdict<T>) -> bool;
-    let cases: [(Motion, Shape, f64, Right<T>); 6] = [
+    let cases: [(Motion, Shape, f64, Right<T>); 8] = [
         (Motion::PureRotation, Shape::Volume, 0.3, |v| matches!(v, RelativePoseVerdict::PureRotation(_))),
         (Motion::Still, Shape::Volume, 0.3, |v| matches!(v, RelativePoseVerdict::NoMotion)),
         (Motion::General, Shape::Line, 0.3, |v| {
@@ -54,6 +54,13 @@ fn degenerate_scenes<T: Real>() {
             matches!(v, RelativePoseVerdict::Unobservable(Unobservable::TooFewDistinct))
         }),
         (Motion::General, Shape::Repeated(1), 0.0, |v| {
+            matches!(v, RelativePoseVerdict::Unobservable(Unobservable::TooFewDistinct))
+        }),
+        // Five points have several poses.
+        (Motion::General, Shape::Repeated(5), 0.0, |v| {
+            matches!(v, RelativePoseVerdict::Unobservable(Unobservable::TooFewDistinct))
+        }),
+        (Motion::General, Shape::Repeated(5), 0.3, |v| {
             matches!(v, RelativePoseVerdict::Unobservable(Unobservable::TooFewDistinct))
         }),
         (Motion::General, Shape::Volume, 1.0, |v| matches!(v, RelativePoseVerdict::NoConsensus)),

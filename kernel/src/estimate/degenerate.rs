@@ -4,7 +4,7 @@ use super::chance::{EXPLAINED_SIGMAS, beyond_chance, line_accident};
 use super::stride;
 use crate::Real;
 use crate::linalg::LANES;
-use crate::real::{lit, sqrt};
+use crate::real::{abs, lit, min, sqrt};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock};
 use crate::robust::Sampler;
 
@@ -173,17 +173,19 @@ fn off_line<T: Real, B: EpipolarBlock<T>>(
     off
 }
 
-/// True where the inliers are repetitions of fewer than `needed` distinct points but for as few as chance explains. One
-/// function for all lists.
+/// True where the inliers are repetitions of too few distinct points for one model, but for as few as chance explains: of
+/// four for a homography, of one more than a `minimal` sample, which has several solutions, for the others. One function for
+/// all lists.
 #[cfg_attr(small, inline(never))]
 pub(super) fn few_distinct<T: Real, B: EpipolarBlock<T>>(
     data: BlockSlice<'_, B>,
     inliers: &mut dyn Iterator<Item = u32>,
-    needed: u32,
+    minimal: u32,
     sigma: T,
     accident: &dyn Fn() -> T,
 ) -> bool {
     let radius = sigma * lit(REPEATED_SIGMAS);
+    let needed = if minimal > 4 { minimal + 1 } else { minimal };
     let mut centres = [[T::ZERO; 4]; DISTINCT];
     let mut sizes = [0u32; DISTINCT];
     let mut used = 0usize;
@@ -192,7 +194,7 @@ pub(super) fn few_distinct<T: Real, B: EpipolarBlock<T>>(
     for index in inliers {
         let Some(p) = point(data, index) else { continue };
         total += 1;
-        let near = |c: &Point<T>| p.iter().zip(c).all(|(a, b)| crate::real::abs(*a - *b) < radius);
+        let near = |c: &Point<T>| p.iter().zip(c).all(|(a, b)| abs(*a - *b) < radius);
         let mut known = false;
         for (centre, size) in centres.iter().zip(&mut sizes).take(used) {
             if near(centre) {
@@ -213,7 +215,7 @@ pub(super) fn few_distinct<T: Real, B: EpipolarBlock<T>>(
             // Points beyond the list's end count as not repeated: with more than one in ten a pose is settled (below).
             _ => {
                 more += 1;
-                if needed == 5 && more > data.count as u32 / 10 {
+                if minimal == 5 && more > data.count as u32 / 10 {
                     return false;
                 }
             }
@@ -235,13 +237,13 @@ pub(super) fn few_distinct<T: Real, B: EpipolarBlock<T>>(
     }
     // Many distinct points, most of them repeated: a homography or a fundamental matrix can be bent to the others; a pose
     // of five points, which they must see in front of both cameras, cannot.
-    if many && (needed == 5 || 3 * held < 2 * total) {
+    if many && (minimal == 5 || 3 * held < 2 * total) {
         return false;
     }
     // Given the most repeated points, each of which takes the place of one of a minimal sample: do the rest agree more
     // often than chance?
     let mut rest = total;
-    for taken in 1..core::cmp::min(needed, 8) {
+    for taken in 1..core::cmp::min(minimal, 8) {
         let (mut largest, mut place) = (0, None);
         for size in &mut sizes {
             if *size > largest {
@@ -255,7 +257,7 @@ pub(super) fn few_distinct<T: Real, B: EpipolarBlock<T>>(
         rest = rest.saturating_sub(largest);
         let wrong = (data.count as u32).saturating_sub(total);
         let repeated = largest > 1 && 2 * rest <= total;
-        if repeated && !beyond_chance(rest + wrong, rest, needed - taken, accident()) {
+        if repeated && !beyond_chance(rest + wrong, rest, minimal - taken, accident()) {
             return true;
         }
     }
@@ -272,7 +274,7 @@ pub(super) fn few_repeated<T: Real, B: EpipolarBlock<T>>(
 ) -> bool {
     let count = data.count as u32;
     let radius = sigma * lit(REPEATED_SIGMAS);
-    let near = |p: &Point<T>, c: &Point<T>| p.iter().zip(c).all(|(a, b)| crate::real::abs(*a - *b) < radius);
+    let near = |p: &Point<T>, c: &Point<T>| p.iter().zip(c).all(|(a, b)| abs(*a - *b) < radius);
     let mut centres: [Option<Point<T>>; DISTINCT] = [None; DISTINCT];
     // The sizes of the largest repetitions, falling.
     let mut sizes = [0u32; DISTINCT];
@@ -294,7 +296,7 @@ pub(super) fn few_repeated<T: Real, B: EpipolarBlock<T>>(
     }
     let held = sizes.iter().take(needed as usize - 1).filter(|&&size| size > 1).sum();
     // The band or disc of an accident has a radius of a few standard deviations, a repetition of some more.
-    2 * held >= count && beyond_chance(count, held, needed, crate::real::min(accident * lit(12.0), T::ONE))
+    2 * held >= count && beyond_chance(count, held, needed, min(accident * lit(12.0), T::ONE))
 }
 
 /// Writes the indices of the set entries of a mask, in order.

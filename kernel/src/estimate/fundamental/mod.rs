@@ -68,7 +68,8 @@ impl<T: Real> Default for FundamentalOptions<T> {
 /// # Degeneracies
 /// Inliers of one plane or of a camera that only turned, but for as few as chance explains and no more than three in ten:
 /// [`FundamentalVerdict::Planar`].
-/// Inliers on one line, or repetitions of fewer than seven distinct points: [`FundamentalVerdict::Unobservable`].
+/// Inliers on one line, or repetitions of fewer than eight distinct points, for seven have up to three
+/// matrices: [`FundamentalVerdict::Unobservable`].
 ///
 /// # Accuracy
 /// That of the maximum-likelihood estimate from the inliers to within a few percent. Coordinates are counted from the

@@ -113,8 +113,8 @@ pub type RelativePoseError = TwoViewError;
 /// # Degeneracies
 /// See [`RelativePoseVerdict`]: none of them ends in a general pose. A plane is the verdict where it explains at least
 /// 17 in 20 inliers, or over 16 where another motion, 3 degrees away and next to one of the plane's, explains as much but for
-/// what three of them are worth; no motion where the mean square motion is below the noise, or
-/// where the views hardly differ ([`RelativePoseOptions::least_motion_px`]).
+/// what three of them are worth; no pose of fewer than six distinct points, for five have up to ten; no motion where the mean
+/// square motion is below the noise, or where the views hardly differ ([`RelativePoseOptions::least_motion_px`]).
 ///
 /// # Accuracy
 /// That of a maximum-likelihood fit to the inliers (Tukey's loss, ending at six standard deviations of the noise found,
