@@ -8,7 +8,7 @@ use epipole::geometry::pose::tangent_basis;
 use epipole::geometry::{BrownConrady, CameraModel, KannalaBrandt, Pinhole, Pose};
 use epipole::nalgebra::{Point3, SVector, UnitQuaternion, Vector2, Vector3};
 use epipole::real::lit;
-use epipole::robust::{Guide, OptionsError, Progress, StopReason};
+use epipole::robust::{Guide, OptionsError, Progress, StopReason, iterations_needed};
 use epipole::{InputError, Real};
 use epipole_host_tests::bundle::problem::cast_pose;
 use epipole_host_tests::matchers::pose_error;
@@ -301,6 +301,28 @@ fn budgets<T: Real>() {
     assert!(estimate.report.excluded_inlier_ratio > lit::<T>(0.5));
 }
 
+/// Wrong matches alone end a search once the fewest inliers that chance does not explain would have been sampled, long
+/// before its limit; as few true ones are still found.
+fn few_wrong_matches_end_early<T: Real>() {
+    for_each_case(10, |seed, _| {
+        let problem = Scene::new(Motion::General, 30).noise_px(0.5).outliers(1.0).generate(seed);
+        let (estimate, _) = estimate_scene::<T>(&problem, &options()).unwrap();
+        let report = &estimate.report;
+        assert!(matches!(estimate.verdict, RelativePoseVerdict::NoConsensus), "{:?}", estimate.verdict);
+        assert_eq!(report.stop, StopReason::Confident);
+        let confidence = options::<T>().ransac.confidence;
+        let least =
+            (6..30).find(|&k| iterations_needed(confidence, k, 30, 5) == report.spent.iterations).unwrap();
+        assert!((10..=15).contains(&least) && report.excluded_inlier_ratio <= lit(least as f64 / 29.9));
+    });
+    let share = share_of(40, |seed, _| {
+        let problem = Scene::new(Motion::General, 30).noise_px(0.5).outliers(0.4).generate(seed);
+        let (estimate, _) = estimate_scene::<T>(&problem, &options()).unwrap();
+        estimate.pose().is_some_and(|pose| pose_error(&pose, &problem.pose).0 < 2.0 * DEGREE)
+    });
+    assert!(share.value() >= 0.9, "{share:?}");
+}
+
 macro_rules! both {
     ($($name:ident),*) => {
         mod f32 { $(#[test] fn $name() { super::$name::<f32>() })* }
@@ -317,7 +339,8 @@ both!(
     ranked_sampling,
     malformed_input,
     extreme_numbers,
-    budgets
+    budgets,
+    few_wrong_matches_end_early
 );
 
 /// Distorted and fisheye cameras: the threshold is in pixels of each, and the pose is found.

@@ -34,6 +34,20 @@ pub(super) fn beyond_chance<T: Real>(count: u32, agreeing: u32, freedom: u32, p:
     ln_accidents(count, agreeing, freedom, p) < ln(lit(ACCIDENTS))
 }
 
+/// How many of `count` must agree at the least to be [`beyond_chance`]; all, where none are.
+pub(super) fn least_beyond_chance<T: Real>(count: u32, freedom: u32, p: T) -> u32 {
+    let (mut low, mut high) = (0, count);
+    while high - low > 1 {
+        let middle = low + (high - low) / 2;
+        if beyond_chance(count, middle, freedom, p) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    high
+}
+
 /// [`beyond_chance`] of the best of `tried` models.
 pub(super) fn best_beyond_chance<T: Real>(tried: u32, count: u32, agreeing: u32, freedom: u32, p: T) -> bool {
     if agreeing <= freedom || count <= freedom {

@@ -1,5 +1,7 @@
 //! Configurations of image points from which no model follows: one line, too few distinct points.
 
+use nalgebra::Vector3;
+
 use super::chance::{EXPLAINED_SIGMAS, beyond_chance, line_accident};
 use super::stride;
 use crate::Real;
@@ -19,6 +21,21 @@ const REPEATED_SIGMAS: f64 = 8.0;
 
 /// Points of both views on the plane: x1, y1, x2, y2.
 type Point<T> = [T; 4];
+
+/// True where two of a sample's points are closer than `distance` in a view: then they say the same thing twice, or
+/// one of them is wrong.
+pub(super) fn repeated<T: Real, const S: usize>(points: &[Vector3<T>; S], distance: T) -> bool {
+    let limit = distance * distance;
+    for i in 1..S {
+        for j in 0..i {
+            // Written so that a NaN counts as repeated.
+            if !((points[i] - points[j]).norm_squared() > limit) {
+                return true;
+            }
+        }
+    }
+    false
+}
 
 #[cfg_attr(small, inline(never))]
 fn point<T: Real, B: EpipolarBlock<T>>(data: BlockSlice<'_, B>, index: u32) -> Option<Point<T>> {

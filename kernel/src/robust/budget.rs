@@ -201,7 +201,7 @@ impl Progress {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum StopReason {
-    /// The confidence was reached.
+    /// The confidence was reached: of the inliers found, or that no consensus of any use is there.
     #[default]
     Confident,
     /// `max_iterations` was reached.

@@ -34,6 +34,12 @@ pub trait Estimator<T: Real, const S: usize> {
     /// How many correspondences there are.
     fn count(&self) -> u32;
 
+    /// How many correspondences must agree with a model for it to be of any use: a run that has found fewer ends once
+    /// samples enough for so many have been drawn. Asked once, after 256 iterations. 0: such a run goes to its limits.
+    fn least_consensus(&self) -> u32 {
+        0
+    }
+
     /// Hands every model of a minimal sample that passes its own checks (cheirality, orientation) to `found`; false,
     /// and nothing handed over, where the sample was rejected as degenerate before it was solved.
     fn generate(&self, sample: &[u32; S], found: &mut impl FnMut(&Self::Model)) -> bool;

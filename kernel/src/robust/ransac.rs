@@ -15,6 +15,8 @@ const SLACK: f64 = 0.7;
 const DOUBTFUL: u32 = 8;
 /// Until the best optimum has been met as often as is wanted, the run lasts so many times as long, and this much longer.
 const PATIENCE: u32 = 2;
+/// After so many iterations a run asks which consensus is of any use: most have ended before.
+const LONG: u32 = 256;
 /// Optima whose costs differ by less than this share of the correspondences count as the same one; where most agree, also
 /// those that differ by less than one correspondence.
 const SAME_OPTIMUM: f64 = 0.003;
@@ -40,7 +42,8 @@ pub struct Consensus<M, T> {
 /// optima, one sample of inliers is not enough: until [`Estimator::DISCOVERIES`] of them have led to the best one
 /// ([`Estimator::RIVALLED_DISCOVERIES`] where another solution came near; half as many where most correspondences agree with
 /// the best), so many times as many samples, and as many again twice, are asked
-/// for. With an order, ranked and uniform samples alternate: the best ranked ones may lie close together.
+/// for. A run that has found less than a consensus of any use ([`Estimator::least_consensus`]) ends once samples enough
+/// for one have been drawn. With an order, ranked and uniform samples alternate: the best ranked ones may lie close together.
 ///
 /// # Input
 /// `order` maps the ranks of ranked sampling to correspondences; without it samples are uniform. `least_inliers` is
@@ -124,6 +127,9 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
     let mut best: Option<(E::Model, Score<T>)> = None;
     let mut sample = [0; S];
     while search.next(order, &mut sample, &mut keep_going) {
+        if search.spent.iterations == LONG {
+            search.ask_for(estimator.least_consensus());
+        }
         if best.is_some_and(|(model, _)| estimator.repeats(&sample, &model)) {
             continue;
         }
@@ -205,6 +211,9 @@ struct Search<'a, T> {
     /// Iterations for the best optimised model.
     needed: u32,
     discoveries: u32,
+    /// The least consensus of any use, 0 where it is not known, and iterations for it.
+    least_consensus: u32,
+    least_needed: u32,
     /// Whether another optimum came near the best.
     rivalled: bool,
     gate: Gate<T>,
@@ -243,6 +252,8 @@ impl<'a, T: Real> Search<'a, T> {
             minimal: Score { cost: T::MAX, inliers: 0 },
             needed: u32::MAX,
             discoveries: 0,
+            least_consensus: 0,
+            least_needed: u32::MAX,
             rivalled: false,
             last_start: options.budget.max_residuals.saturating_sub(one_score),
             exhausted: options.budget.max_residuals < one_score,
@@ -262,10 +273,13 @@ impl<'a, T: Real> Search<'a, T> {
         if spent.iterations >= budget.max_iterations {
             return false;
         }
-        let patience = if self.discoveries < wanted { wanted.saturating_add(PATIENCE) } else { 1 };
-        if spent.iterations
-            >= core::cmp::max(self.needed.saturating_mul(patience), self.options.min_iterations)
-        {
+        let needed = if spent.inliers < self.least_consensus {
+            self.least_needed
+        } else {
+            let patience = if self.discoveries < wanted { wanted.saturating_add(PATIENCE) } else { 1 };
+            self.needed.saturating_mul(patience)
+        };
+        if spent.iterations >= core::cmp::max(needed, self.options.min_iterations) {
             self.stop = StopReason::Confident;
             return false;
         }
@@ -297,6 +311,12 @@ impl<'a, T: Real> Search<'a, T> {
             }
         }
         true
+    }
+
+    /// Less than such a consensus is of no use.
+    fn ask_for(&mut self, inliers: u32) {
+        self.least_consensus = inliers;
+        self.least_needed = iterations_needed(self.options.confidence, inliers, self.count, self.size);
     }
 
     /// The cost up to which a hypothesis is of interest: near misses are optimised too, at a bounded rate.

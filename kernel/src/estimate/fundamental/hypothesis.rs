@@ -4,6 +4,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::Real;
+use crate::estimate::chance::{least_beyond_chance, line_accident};
 use crate::estimate::stride;
 use crate::geometry::pose::skew;
 use crate::linalg::{LANES, Lanes};
@@ -135,6 +136,10 @@ impl<T: Real> Estimator<T, 7> for EpipolarProblem<'_, T> {
 
     fn count(&self) -> u32 {
         self.data.count as u32
+    }
+
+    fn least_consensus(&self) -> u32 {
+        least_beyond_chance(self.data.count as u32, 7, line_accident(self.data, self.threshold))
     }
 
     fn generate(&self, sample: &[u32; 7], found: &mut impl FnMut(&FundamentalModel<T>)) -> bool {

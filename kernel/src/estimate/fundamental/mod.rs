@@ -77,8 +77,8 @@ impl<T: Real> Default for FundamentalOptions<T> {
 ///
 /// # Cost
 /// At most [`Budget::max_iterations`](crate::robust::Budget) samples of seven, by itself as many as the confidence
-/// needs for the inliers found, and one local optimisation of at most 13 passes over the correspondences for each that
-/// leads; at most 20 in the end, twice as many where a plane holds most inliers.
+/// needs for the inliers found, or for the fewest that chance does not explain, and one local optimisation of at most 13
+/// passes over the correspondences for each that leads; at most 20 in the end, twice as many where a plane holds most inliers.
 ///
 /// # References
 /// O. Chum, T. Werner, J. Matas, "Two-view geometry estimation unaffected by a dominant plane", CVPR 2005, and

@@ -7,9 +7,10 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::super::chance::line_accident;
+use super::super::degenerate::repeated;
 use super::super::prior::PriorFit;
 use super::LEAST_INLIERS;
-use super::hypothesis::{PoseProblem, repeated};
+use super::hypothesis::PoseProblem;
 use super::judge::{Judge, Left};
 use super::prior::KnownRotation;
 use super::verdict::{RelativePoseEstimate, RelativePoseVerdict};

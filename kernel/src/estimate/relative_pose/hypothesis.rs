@@ -18,7 +18,8 @@ use crate::robust::loss::Loss;
 use crate::robust::{Estimator, Gate, Score, ScoreCounts, Tally};
 use crate::solvers::relpose_5pt;
 
-use super::super::chance::EXPLAINED_SIGMAS;
+use super::super::chance::{EXPLAINED_SIGMAS, least_beyond_chance, line_accident};
+use super::super::degenerate::repeated;
 use super::super::stride;
 use super::planar::exchange_two;
 use super::prior::RotationPrior;
@@ -342,6 +343,10 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
         self.data.count as u32
     }
 
+    fn least_consensus(&self) -> u32 {
+        least_beyond_chance(self.data.count as u32, 5, line_accident(self.data, self.threshold))
+    }
+
     fn generate(&self, sample: &[u32; 5], found: &mut impl FnMut(&PoseModel<T>)) -> bool {
         let mut f1 = [Vector3::zeros(); 5];
         let mut f2 = [Vector3::zeros(); 5];
@@ -416,21 +421,6 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
         *residuals += TURN_PASSES * core::cmp::min(TURNED_BLOCKS * LANES, self.data.count) as u64;
         self.turns(model)
     }
-}
-
-/// True where two of a sample's points are closer than `distance` in a view: then they say the same thing twice, or
-/// one of them is wrong.
-pub(super) fn repeated<T: Real, const S: usize>(points: &[Vector3<T>; S], distance: T) -> bool {
-    let limit = distance * distance;
-    for i in 1..S {
-        for j in 0..i {
-            // Written so that a NaN counts as repeated.
-            if !((points[i] - points[j]).norm_squared() > limit) {
-                return true;
-            }
-        }
-    }
-    false
 }
 
 /// The first pose of an essential matrix for which all five points lie in front of both cameras, those with parallel
