@@ -64,21 +64,22 @@ pub fn relpose_upright_3pt<T: Real>(x1: &[Vector3<T>; 3], x2: &[Vector3<T>; 3]) 
 /// A function of its own, so that the solutions are written where the caller wants them.
 #[inline]
 fn solve<T: Real>(x1: &[Vector3<T>; 3], x2: &[Vector3<T>; 3], solutions: &mut Solutions<Pose<T>, 4>) {
-    // 2 det = Re(S2 / e^2) + 2 Im(S1 / e) - S0
+    // 2 det = Re(S2 / e^2) + 2 Im(S1 / e) - S0, summed product by product
     let horizontal = |v: &Vector3<T>| Complex(v.z, v.x);
     let term = |i: usize, j: usize, k: usize| {
         let (a_i, a_j) = (horizontal(&x2[i]).scale(x1[i].y), horizontal(&x2[j]).scale(x1[j].y));
         let (b_i, b_j) = (horizontal(&x1[i]).scale(x2[i].y), horizontal(&x1[j]).scale(x2[j].y));
         let g = horizontal(&x1[k]).conj_mul(horizontal(&x2[k]));
         let constant = a_i.conj_mul(a_j).1 + b_i.conj_mul(b_j).1;
-        let linear = a_j.conj_mul(b_i).sub(a_i.conj_mul(b_j));
-        let product = g.0 * linear.0 - g.1 * linear.1;
-        (linear.conj_mul(g), g.scale(constant), product)
+        (a_j.conj_mul(b_i).sub(a_i.conj_mul(b_j)), g, constant)
     };
-    let (t0, t1, t2) = (term(1, 2, 0), term(2, 0, 1), term(0, 1, 2));
-    let s2 = Complex(t0.0.0 + t1.0.0 + t2.0.0, t0.0.1 + t1.0.1 + t2.0.1);
-    let s1 = Complex(t0.1.0 + t1.1.0 + t2.1.0, t0.1.1 + t1.1.1 + t2.1.1);
-    let s0 = t0.2 + t1.2 + t2.2;
+    let ((l0, g0, c0), (l1, g1, c1), (l2, g2, c2)) = (term(1, 2, 0), term(2, 0, 1), term(0, 1, 2));
+    let real = l0.0 * g0.0 + l1.0 * g1.0 + l2.0 * g2.0;
+    let imaginary = l0.1 * g0.1 + l1.1 * g1.1 + l2.1 * g2.1;
+    let mixed = (l0.0 * g0.1 - l0.1 * g0.0) + (l1.0 * g1.1 - l1.1 * g1.0) + (l2.0 * g2.1 - l2.1 * g2.0);
+    let s2 = Complex(real + imaginary, mixed);
+    let s1 = Complex(c0 * g0.0 + c1 * g1.0 + c2 * g2.0, c0 * g0.1 + c1 * g1.1 + c2 * g2.1);
+    let s0 = real - imaginary;
     // Where it is zero or not a number no line below meets the circle.
     let inverse_size = T::ONE / (abs(s2.0) + abs(s2.1) + abs(s1.0) + abs(s1.1) + abs(s0));
     let (s2, s1, s0) = (s2.scale(inverse_size), s1.scale(inverse_size), s0 * inverse_size);
@@ -223,7 +224,7 @@ fn push_pose<T: Real>(
         let across = t.cross(&y2.cross(z2));
         if (a0 * across.dot(z2) > T::ZERO) & (a0 * across.dot(&y2) > T::ZERO) {
             // Over the root, without waiting for it.
-            let t = t * with_sign_of(sqrt(square) * (T::ONE / square), a0);
+            let t = t * (with_sign_of(sqrt(square), a0) * (T::ONE / square));
             solutions.push(Pose::from_parts(Translation3::from(t), rotation_about_y(e.0, e.1)));
         }
     }
