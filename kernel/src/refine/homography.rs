@@ -68,6 +68,9 @@ fn symmetric<X: Copy>([a, b, c, d, e, f]: [X; 6]) -> [[X; 3]; 3] {
     [[a, b, d], [b, c, e], [d, e, f]]
 }
 
+/// Lanes of which the terms are held before they are added.
+const SIDE_BY_SIDE: usize = if cfg!(scalar) { 1 } else { LANES };
+
 /// Sums of a pass, lane by lane.
 struct Sums<T> {
     /// Six scalars (00, 01, 11, 02, 12, 22 of the rows of H) times the six products of the point's coordinates.
@@ -94,43 +97,43 @@ impl<T: Real> Sums<T> {
         loss: &Loss<T>,
         filled: usize,
     ) {
-        let zero = [T::ZERO; LANES];
-        let mut row = [zero; 6];
-        let mut slope = [zero; 3];
-        let mut point = [zero; 6];
-        let mut along = [zero; 3];
-        for l in 0..LANES {
-            let (x, y) = (plane[0][l], plane[1][l]);
-            let t = Transfer::new(h, x, y, plane[2][l], plane[3][l]);
-            let mut weight = T::ZERO;
-            if l < filled {
-                let (cost, w) = loss.evaluate(t.squared * weights[l]);
-                self.cost[l] += cost;
-                weight = w * weights[l];
+        for group in 0..LANES / SIDE_BY_SIDE {
+            let zero = [T::ZERO; SIDE_BY_SIDE];
+            let (mut row, mut slope, mut point, mut along) = ([zero; 6], [zero; 3], [zero; 6], [zero; 3]);
+            for k in 0..SIDE_BY_SIDE {
+                let l = group * SIDE_BY_SIDE + k;
+                let (x, y) = (plane[0][l], plane[1][l]);
+                let t = Transfer::new(h, x, y, plane[2][l], plane[3][l]);
+                let mut weight = T::ZERO;
+                if l < filled {
+                    let (cost, w) = loss.evaluate(t.squared * weights[l]);
+                    self.cost[l] += cost;
+                    weight = w * weights[l];
+                }
+                let (w00, w01, w11) = (weight * t.w[0], weight * t.w[1], weight * t.w[2]);
+                let (w02, w12) = (-(w00 * t.u + w01 * t.v), -(w01 * t.u + w11 * t.v));
+                let w22 = -(w02 * t.u + w12 * t.v);
+                (row[0][k], row[1][k], row[2][k]) = (w00, w01, w11);
+                (row[3][k], row[4][k], row[5][k]) = (w02, w12, w22);
+                let (a, b, c) = (x * t.inverse_z, y * t.inverse_z, t.inverse_z);
+                (point[0][k], point[1][k], point[2][k]) = (a * a, a * b, b * b);
+                (point[3][k], point[4][k], point[5][k]) = (a * c, b * c, c * c);
+                (along[0][k], along[1][k], along[2][k]) = (a, b, c);
+                let (p, q) = (w00 * t.ex + w01 * t.ey, w01 * t.ex + w11 * t.ey);
+                (slope[0][k], slope[1][k], slope[2][k]) = (p, q, -(t.u * p + t.v * q));
             }
-            let (w00, w01, w11) = (weight * t.w[0], weight * t.w[1], weight * t.w[2]);
-            let (w02, w12) = (-(w00 * t.u + w01 * t.v), -(w01 * t.u + w11 * t.v));
-            let w22 = -(w02 * t.u + w12 * t.v);
-            (row[0][l], row[1][l], row[2][l]) = (w00, w01, w11);
-            (row[3][l], row[4][l], row[5][l]) = (w02, w12, w22);
-            let (a, b, c) = (x * t.inverse_z, y * t.inverse_z, t.inverse_z);
-            (point[0][l], point[1][l], point[2][l]) = (a * a, a * b, b * b);
-            (point[3][l], point[4][l], point[5][l]) = (a * c, b * c, c * c);
-            (along[0][l], along[1][l], along[2][l]) = (a, b, c);
-            let (p, q) = (w00 * t.ex + w01 * t.ey, w01 * t.ex + w11 * t.ey);
-            (slope[0][l], slope[1][l], slope[2][l]) = (p, q, -(t.u * p + t.v * q));
-        }
-        for i in 0..6 {
-            for j in 0..6 {
-                for l in 0..LANES {
-                    self.products[i][j][l] += row[i][l] * point[j][l];
+            for i in 0..6 {
+                for j in 0..6 {
+                    for k in 0..SIDE_BY_SIDE {
+                        self.products[i][j][group * SIDE_BY_SIDE + k] += row[i][k] * point[j][k];
+                    }
                 }
             }
-        }
-        for i in 0..3 {
-            for j in 0..3 {
-                for l in 0..LANES {
-                    self.slopes[i][j][l] += slope[i][l] * along[j][l];
+            for i in 0..3 {
+                for j in 0..3 {
+                    for k in 0..SIDE_BY_SIDE {
+                        self.slopes[i][j][group * SIDE_BY_SIDE + k] += slope[i][k] * along[j][k];
+                    }
                 }
             }
         }

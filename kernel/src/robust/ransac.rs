@@ -108,6 +108,7 @@ pub struct Consensus<M, T> {
 /// let ((a, b), score) = consensus.best.unwrap();
 /// assert!((a - 1.0).abs() < 1e-5 && (b - 0.5).abs() < 1e-5 && score.inliers == 8);
 /// ```
+#[cfg_attr(small, inline(never))]
 pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
     estimator: &E,
     options: &RansacOptions<T>,
@@ -130,7 +131,7 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
         if search.spent.iterations == LONG {
             search.ask_for(estimator.least_consensus());
         }
-        if best.is_some_and(|(model, _)| estimator.repeats(&sample, &model)) {
+        if best.as_ref().is_some_and(|(model, _)| estimator.repeats(&sample, model)) {
             continue;
         }
         let bound = search.bound();
@@ -140,7 +141,7 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
                 return;
             }
             let Some(model) = &estimator.polish(model, bound, &mut search.counts) else { return };
-            if best.is_some_and(|(best, _)| estimator.leads_back(model, &best)) {
+            if best.as_ref().is_some_and(|(best, _)| estimator.leads_back(model, best)) {
                 return;
             }
             search.gate.bound = bound;
@@ -148,7 +149,7 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
             if score.cost < search.minimal.cost {
                 search.minimal = score;
             }
-            if leader.is_none_or(|(_, best)| score.cost < best.cost) {
+            if leader.as_ref().is_none_or(|(_, best)| score.cost < best.cost) {
                 leader = Some((*model, score));
             }
         });
@@ -167,7 +168,7 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
             }
             search.add_up();
         }
-        let former = best.map(|(model, score)| (score, estimator.differs(&candidate.0, &model)));
+        let former = best.as_ref().map(|(model, score)| (*score, estimator.differs(&candidate.0, model)));
         let leads = former.is_none_or(|(former, _)| candidate.1.cost < former.cost);
         if leads {
             if estimator.reject(&candidate.0) {
