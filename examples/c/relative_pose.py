@@ -26,6 +26,7 @@ class Options(ctypes.Structure):
         ("least_motion_px", ctypes.c_double),
         ("prior_view1", ctypes.c_double * 3), ("prior_view2", ctypes.c_double * 3), ("prior_sigma_rad", ctypes.c_double),
         ("prior_rotation", ctypes.c_double * 4), ("prior_covariance", ctypes.c_double * 9), ("prior", ctypes.c_uint32),
+        ("no_planes", ctypes.c_uint32),
     ]
 
 

@@ -1,7 +1,7 @@
 //! `estimate::relative_pose`: the truth, the verdicts, malformed input, determinism, budgets, covariance.
 
 use epipole::estimate::{
-    RelativePoseError, RelativePoseOptions, RelativePosePrior, RelativePoseVerdict, Unobservable,
+    PriorFit, RelativePoseError, RelativePoseOptions, RelativePosePrior, RelativePoseVerdict, Unobservable,
     refine_relative_pose, relative_pose, relative_pose_guided,
 };
 use epipole::geometry::pose::tangent_basis;
@@ -111,6 +111,45 @@ fn planes_have_no_rival<T: Real>() {
             rival.is_none()
         });
         assert!(share.value() >= 0.9, "{noise}: {share:?}");
+    }
+}
+
+/// Without the look at planes no pose is said to be the only one; scenes that are neither general nor a plane are judged alike.
+fn planes_left_unexamined<T: Real>() {
+    let mut unexamined = options::<T>();
+    unexamined.planes = false;
+    for (motion, gravity) in [(Motion::General, false), (Motion::Forward, false), (Motion::General, true)] {
+        let share = share_of(40, |seed, _| {
+            let problem = noisy(motion, Shape::Volume).generate(seed + 21_000);
+            let mut options = unexamined;
+            let rotation = cast_pose::<_, T>(&problem.pose).rotation;
+            let (view1, view2) = (Vector3::y(), rotation * Vector3::y());
+            options.prior =
+                gravity.then(|| RelativePosePrior::Gravity { view1, view2, sigma_rad: lit(0.01) });
+            let (estimate, _) = estimate_scene::<T>(&problem, &options).unwrap();
+            let RelativePoseVerdict::GeneralOrPlanar(found) = estimate.verdict else { return false };
+            assert_eq!((estimate.pose(), estimate.general), (Some(found.pose), None));
+            let fits = matches!(estimate.prior, Some(PriorFit::Fits(_)));
+            let (r, t) = pose_error(&found.pose, &problem.pose);
+            fits == gravity && found.covariance.is_some() && r < 0.5 * DEGREE && t < 5.0 * DEGREE
+        });
+        assert!(share.value() >= 0.95, "{motion:?}, gravity {gravity}: {share:?}");
+    }
+    for seed in 0..20 {
+        let plane = noisy(Motion::General, Shape::Plane).generate(seed + 22_000);
+        let verdict = estimate_scene::<T>(&plane, &unexamined).unwrap().0.verdict;
+        assert!(matches!(verdict, RelativePoseVerdict::GeneralOrPlanar(_)), "{seed}: {verdict:?}");
+        for (motion, shape) in [
+            (Motion::PureRotation, Shape::Volume),
+            (Motion::Still, Shape::Volume),
+            (Motion::General, Shape::Line),
+            (Motion::General, Shape::Repeated(3)),
+        ] {
+            let problem = noisy(motion, shape).generate(seed + 23_000);
+            let [full, less] =
+                [options(), unexamined].map(|options| estimate_scene::<T>(&problem, &options).unwrap());
+            assert_eq!(full, less, "{motion:?} {shape:?} {seed}");
+        }
     }
 }
 
@@ -334,6 +373,7 @@ both!(
     degenerate_scenes,
     planar_scenes,
     planes_have_no_rival,
+    planes_left_unexamined,
     determinism,
     progress_counts_on,
     ranked_sampling,

@@ -50,7 +50,7 @@ fn pixels<T: Real>(
 
 fn take<T: Real>(estimate: &RelativePoseEstimate<T>, sink: &mut Sink) {
     match &estimate.verdict {
-        RelativePoseVerdict::General(motion) => {
+        RelativePoseVerdict::General(motion) | RelativePoseVerdict::GeneralOrPlanar(motion) => {
             sink.count(0);
             sink.finite_pose(&motion.pose);
             sink.finite(motion.covariance.iter().flatten());

@@ -295,6 +295,8 @@ enum epi_relative_pose_verdict
     EPI_RELATIVE_POSE_VERDICT_NO_CONSENSUS = 6,
     // A verdict that this version of the header does not name.
     EPI_RELATIVE_POSE_VERDICT_OTHER = 7,
+    // A general motion unless the scene is a plane, which `no_planes` left unexamined: `poses[0]`, covariance 5x5.
+    EPI_RELATIVE_POSE_VERDICT_GENERAL_OR_PLANAR = 8,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -612,6 +614,9 @@ typedef struct epi_relative_pose_options_f32 {
     float prior_covariance[3][3];
     // What is known: one of `epi_relative_pose_prior`, of which a library without the feature `prior` takes none.
     uint32_t prior;
+    // Not 0: whether the inliers lie on a plane, which leaves two poses, is not examined, and a general motion's verdict is
+    // `GENERAL_OR_PLANAR`.
+    uint32_t no_planes;
 } epi_relative_pose_options_f32;
 
 // How a search went.
@@ -1039,6 +1044,9 @@ typedef struct epi_relative_pose_options_f64 {
     double prior_covariance[3][3];
     // What is known: one of `epi_relative_pose_prior`, of which a library without the feature `prior` takes none.
     uint32_t prior;
+    // Not 0: whether the inliers lie on a plane, which leaves two poses, is not examined, and a general motion's verdict is
+    // `GENERAL_OR_PLANAR`.
+    uint32_t no_planes;
 } epi_relative_pose_options_f64;
 
 // How a search went.

@@ -62,6 +62,8 @@ pub enum RelativePoseVerdict {
     NoConsensus = 6,
     /// A verdict that this version of the header does not name.
     Other = 7,
+    /// A general motion unless the scene is a plane, which `no_planes` left unexamined: `poses[0]`, covariance 5x5.
+    GeneralOrPlanar = 8,
 }
 
 /// Why inliers that agree fix no model.

@@ -209,8 +209,9 @@ impl<T: Real> From<&estimate::RelativePoseEstimate<T>> for RelativePoseEstimate<
         use enums::RelativePoseVerdict as C;
         use estimate::RelativePoseVerdict as Kernel;
         let mut found = match &kernel.verdict {
-            Kernel::General(motion) => {
-                let mut found = Self::empty(C::General);
+            Kernel::General(motion) | Kernel::GeneralOrPlanar(motion) => {
+                let general = matches!(kernel.verdict, Kernel::General(_));
+                let mut found = Self::empty(if general { C::General } else { C::GeneralOrPlanar });
                 found.pose_count = 1;
                 found.poses[0] = motion.pose.into();
                 found.covariance_size[0] = write_rows(&motion.covariance, &mut found.covariance[0]);

@@ -48,6 +48,9 @@ pub struct RelativePoseOptions<T> {
     pub prior_covariance: [[T; 3]; 3],
     /// What is known: one of `epi_relative_pose_prior`, of which a library without the feature `prior` takes none.
     pub prior: u32,
+    /// Not 0: whether the inliers lie on a plane, which leaves two poses, is not examined, and a general motion's verdict is
+    /// `GENERAL_OR_PLANAR`.
+    pub no_planes: u32,
 }
 
 /// Options of `epi_homography`.
@@ -240,7 +243,8 @@ search_options!(
     prior_sigma_rad: T::ZERO,
     prior_rotation: [T::ZERO; 4],
     prior_covariance: [[T::ZERO; 3]; 3],
-    prior: enums::RelativePosePrior::None as u32
+    prior: enums::RelativePosePrior::None as u32,
+    no_planes: 0
 );
 search_options!(HomographyOptions);
 search_options!(FundamentalOptions);
@@ -279,6 +283,7 @@ impl<T: Real> RelativePoseOptions<T> {
             }),
             _ => return Err(Status::UnknownEnum),
         };
+        kernel.planes = self.no_planes == 0;
         Ok(kernel)
     }
 }

@@ -590,6 +590,11 @@ macro_rules! round_trips {
                         relative_pose(&c, &c, flat(&u1), flat(&u2), 60, &o, room, size, &mut e, e_size, m);
                     assert_eq!(found, Status::NotFinite as i32);
                     o.least_motion_px = -1.0;
+                    o.no_planes = 1;
+                    let found =
+                        relative_pose(&c, &c, flat(&u1), flat(&u2), 60, &o, room, size, &mut e, e_size, m);
+                    assert_eq!((found, e.verdict), (1, RelativePoseVerdict::GeneralOrPlanar as u32));
+                    o.no_planes = 0;
                     let start = pose_of(&pose);
                     let mut refined = zero!(out::RefinedRelativePose<S>);
                     let mut w = storage.workspace();

@@ -1,6 +1,7 @@
 //! Entry points in single precision, each an exported function: `examples/firmware/measure` links the archive once for
 //! every function, with all that it does not reach left out, and once for all of them. With the feature `alone` it holds the
-//! relative pose with points alone: the compiler then sees every call, as in a firmware that needs nothing else.
+//! relative pose with points alone: the compiler then sees every call, as in a firmware that needs nothing else, with
+//! `no_planes` one that does without the look at planes.
 #![no_std]
 #![cfg_attr(feature = "alone", allow(dead_code, unused_imports))]
 #![allow(improper_ctypes_definitions)]
@@ -89,6 +90,7 @@ fn with_points(
 ) -> Result<RelativePoseEstimate<f32>, RelativePoseError> {
     let mut options = RelativePoseOptions::default();
     options.max_error_px = max_error_px;
+    options.planes = !cfg!(feature = "no_planes");
     let estimate = relative_pose(camera, camera, x1, x2, &options, workspace);
     if let Ok(estimate) = &estimate
         && let Some(pose) = estimate.pose()

@@ -124,6 +124,11 @@ pub fn relative_pose_reply(
             RelativePoseVerdict::Unobservable(Unobservable::Collinear) => body.u8(4),
             RelativePoseVerdict::Unobservable(_) => body.u8(5),
             RelativePoseVerdict::TooFewInliers => body.u8(6),
+            RelativePoseVerdict::GeneralOrPlanar(motion) => {
+                body.u8(8);
+                write_pose(body, &motion.pose);
+                write_covariance(body, &motion.covariance);
+            }
             _ => body.u8(7),
         }
         write_mask(body, inliers);
@@ -215,6 +220,7 @@ fn relative<'a>(body: &mut Reader<'a>) -> Option<Answer<'a, RelativePoseEstimate
         5 => RelativePoseVerdict::Unobservable(Unobservable::TooFewDistinct),
         6 => RelativePoseVerdict::TooFewInliers,
         7 => RelativePoseVerdict::NoConsensus,
+        8 => RelativePoseVerdict::GeneralOrPlanar(read_motion(body)?),
         _ => return None,
     };
     let estimate = RelativePoseEstimate { verdict, general, prior, noise_px, report };

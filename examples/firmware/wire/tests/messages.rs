@@ -160,20 +160,22 @@ fn estimates_come_back() {
     let camera = Pinhole::new(500.0, 500.0, 0.0, 0.0).unwrap();
     let mut storage = RelativePoseStorage::<f32, 100>::new();
     let mut workspace = storage.workspace();
-    let mut verdicts = [0; 3];
-    for k in 0..20 {
+    let mut verdicts = [0; 4];
+    for k in 0..30 {
         let geometry = [Geometry::Ransac, Geometry::Planar][k as usize % 2];
         let scene = TwoView::<100>::new(geometry, k);
         let [x1, mut x2] = scene.pixels();
         if k % 5 == 4 {
             x2 = x1;
         }
-        let options = RelativePoseOptions::default();
+        let mut options = RelativePoseOptions::default();
+        options.planes = k % 3 != 2;
         let estimate = relative_pose(&camera, &camera, &x1, &x2, &options, &mut workspace).unwrap();
         verdicts[match estimate.verdict {
             RelativePoseVerdict::General(_) => 0,
             RelativePoseVerdict::Planar(_) => 1,
-            _ => 2,
+            RelativePoseVerdict::GeneralOrPlanar(_) => 2,
+            _ => 3,
         }] += 1;
         let mut out = [0; encoded_len(reply_bytes(100))];
         let n = relative_pose_reply(&mut out, 9, Order::Gap, 1234, &estimate, workspace.inliers()).unwrap();

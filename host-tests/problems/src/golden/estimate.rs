@@ -41,7 +41,7 @@ fn pixels<T: Real>(scene: &TwoView<N>, camera: &Camera<T>) -> [[Vector2<T>; N]; 
 
 fn verdict<T: Real>(estimate: &RelativePoseEstimate<T>, sink: &mut Sink) {
     match &estimate.verdict {
-        RelativePoseVerdict::General(motion) => {
+        RelativePoseVerdict::General(motion) | RelativePoseVerdict::GeneralOrPlanar(motion) => {
             sink.finite_pose(&motion.pose);
             sink.finite(motion.covariance.iter().flatten());
         }

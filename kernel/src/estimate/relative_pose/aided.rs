@@ -9,11 +9,11 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use super::super::chance::line_accident;
 use super::super::degenerate::repeated;
 use super::super::prior::PriorFit;
-use super::LEAST_INLIERS;
 use super::hypothesis::PoseProblem;
 use super::judge::{Judge, Left};
 use super::prior::KnownRotation;
 use super::verdict::{RelativePoseEstimate, RelativePoseVerdict};
+use super::{LEAST_INLIERS, RelativePoseOptions};
 use crate::Real;
 use crate::geometry::pose::upright;
 use crate::linalg::LANES;
@@ -255,7 +255,7 @@ fn search<T: Real, B: EpipolarBlock<T>>(
 pub(super) fn judge<T: Real, B: EpipolarBlock<T>>(
     plain: &Judge<'_, '_, T, B>,
     known: &KnownRotation<T>,
-    options: &RansacOptions<T>,
+    options: &RelativePoseOptions<T>,
     guide: Guide<'_, T>,
     mask: &mut [bool],
     order: &mut [u32],
@@ -263,6 +263,7 @@ pub(super) fn judge<T: Real, B: EpipolarBlock<T>>(
 ) {
     let problem = PoseProblem { prior: Some((known, plain.sigma * plain.sigma)), ..*plain.problem };
     let aided = Judge { problem: &problem, ..*plain };
+    let (planes, options) = (options.planes, &options.ransac);
     let Guide { scores, mut keep_going } = guide;
     // Reborrowed, for a second search may need it.
     let ask = keep_going.as_mut().map(|ask| &mut **ask as &mut dyn FnMut(&_) -> bool);
@@ -271,8 +272,11 @@ pub(super) fn judge<T: Real, B: EpipolarBlock<T>>(
     let mut interrupted = first.is_some_and(|first| first.report.stop == StopReason::Interrupted);
     let confident = first.filter(|first| first.report.stop == StopReason::Confident);
     if let Some(first) = confident {
-        aided.judge(&first, &mut Left::none(), mask, order, estimate);
-        if !matches!(estimate.verdict, RelativePoseVerdict::General(_)) {
+        aided.judge(&first, planes, &mut Left::none(), mask, order, estimate);
+        if !matches!(
+            estimate.verdict,
+            RelativePoseVerdict::General(_) | RelativePoseVerdict::GeneralOrPlanar(_)
+        ) {
             estimate.prior = known.agreement(&estimate.verdict);
         }
         if let Some(PriorFit::Fits(_)) = estimate.prior {
@@ -312,8 +316,11 @@ pub(super) fn judge<T: Real, B: EpipolarBlock<T>>(
     if let Some(first) = first
         && first.report.cost < second.report.cost
     {
-        aided.judge(&first, &mut Left::none(), mask, order, estimate);
-        if !matches!(estimate.verdict, RelativePoseVerdict::General(_)) {
+        aided.judge(&first, planes, &mut Left::none(), mask, order, estimate);
+        if !matches!(
+            estimate.verdict,
+            RelativePoseVerdict::General(_) | RelativePoseVerdict::GeneralOrPlanar(_)
+        ) {
             estimate.prior = known.agreement(&estimate.verdict);
         }
         if let Some(PriorFit::Fits(_)) = estimate.prior {
@@ -324,10 +331,10 @@ pub(super) fn judge<T: Real, B: EpipolarBlock<T>>(
     estimate.report = total(second.report);
     let budget = left.budget.less(&second.report.spent);
     let searched = second.report.spent.iterations;
-    plain.judge(&second, &mut Left { searched, budget, keep_going }, mask, order, estimate);
+    plain.judge(&second, planes, &mut Left { searched, budget, keep_going }, mask, order, estimate);
     let fit = known.agreement(&estimate.verdict);
     if let Some(PriorFit::Fits(_)) = fit {
-        aided.judge(&second, &mut Left::none(), mask, order, estimate);
+        aided.judge(&second, planes, &mut Left::none(), mask, order, estimate);
     }
     estimate.prior = fit;
 }

@@ -126,10 +126,11 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
 
     /// Writes verdict and noise, in the blocks' unit, of what a search found (in place, for a verdict is large), how a prior
     /// that took part agrees with a general motion, and the inlier mask; uses `order` as memory. The report is that of the
-    /// search; what more is spent is added.
+    /// search; what more is spent is added. Whether `planes` are looked for is an argument of its own: the compiler sees it.
     pub(super) fn judge(
         &self,
         consensus: &Consensus<PoseModel<T>, T>,
+        planes: bool,
         left: &mut Left<'_>,
         mask: &mut [bool],
         order: &mut [u32],
@@ -137,7 +138,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     ) {
         (estimate.noise_px, estimate.general) = (T::ZERO, None);
         match &consensus.best {
-            Some((model, _)) => self.verdict(model, left, mask, order, estimate),
+            Some((model, _)) => self.verdict(model, planes, left, mask, order, estimate),
             None => {
                 mask.iter_mut().for_each(|inlier| *inlier = false);
                 self.without_model(estimate);
@@ -159,6 +160,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     fn verdict(
         &self,
         best: &PoseModel<T>,
+        planes: bool,
         left: &mut Left<'_>,
         mask: &mut [bool],
         order: &mut [u32],
@@ -221,7 +223,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         }
         // Where most correspondences agree, the pose and its plane are known well after few passes.
         let clear = 2 * inliers > count;
-        if let Some(mut plane) = self.plane(&refined.model, indices, sigma, clear) {
+        if planes && let Some(mut plane) = self.plane(&refined.model, indices, sigma, clear) {
             let held = evidence.explained(&plane.0).inliers;
             let planar = 20 * held > inliers * LEAST_SHARE_OF_20;
             if planar && clear {
@@ -301,7 +303,11 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
             }
         }
         let (motion, fit) = self.motion(&refined, &spread);
-        estimate.verdict = RelativePoseVerdict::General(motion);
+        estimate.verdict = if planes {
+            RelativePoseVerdict::General(motion)
+        } else {
+            RelativePoseVerdict::GeneralOrPlanar(motion)
+        };
         estimate.noise_px = spread.noise;
         estimate.prior = fit;
     }

@@ -1,4 +1,4 @@
-//! The relative pose of two calibrated views.
+//! The relative pose of two calibrated views. Over 500 lines: half of them document what users call.
 
 use nalgebra::Vector2;
 
@@ -49,6 +49,11 @@ pub struct RelativePoseOptions<T: Real> {
     /// Gravity or the rotation, if known: then samples are smaller, and it enters the refinement. A prior that contradicts
     /// the correspondences is left aside and reported. Default none.
     pub prior: Option<RelativePosePrior<T>>,
+    /// Whether it is examined if the inliers lie on a plane, which leaves two poses. Without that the verdict on a general
+    /// motion, and on a plane, is [`RelativePoseVerdict::GeneralOrPlanar`] (of planes one pose in three is then the wrong
+    /// one of the two), every other verdict is the same, and firmware whose compiler sees it takes a fifth less flash. For
+    /// scenes that are known to be no plane. Default true.
+    pub planes: bool,
     /// Confidence, iterations, budgets and seed.
     pub ransac: RansacOptions<T>,
 }
@@ -60,6 +65,7 @@ impl<T: Real> Default for RelativePoseOptions<T> {
             sigma_px: None,
             least_motion_px: None,
             prior: None,
+            planes: true,
             ransac: RansacOptions::of_two_views(),
         }
     }
@@ -111,7 +117,8 @@ pub type RelativePoseError = TwoViewError;
 /// [`RelativePoseError`], with everything untouched.
 ///
 /// # Degeneracies
-/// See [`RelativePoseVerdict`]: none of them ends in a general pose. A plane is the verdict where it explains at least
+/// See [`RelativePoseVerdict`]: none of them ends in a general pose, but planes where
+/// [`planes`](RelativePoseOptions::planes) leaves them unexamined, of which the verdict then says so. A plane is the verdict where it explains at least
 /// 17 in 20 inliers, or over 16 where another motion, 3 degrees away and next to one of the plane's, explains as much but for
 /// what three of them are worth; no pose of fewer than six distinct points, for five have up to ten; no motion where the mean
 /// square motion is below the noise, or where the views hardly differ ([`RelativePoseOptions::least_motion_px`]).
@@ -249,7 +256,8 @@ pub fn relative_pose_guided<T: Real>(
 ) -> Result<RelativePoseEstimate<T>, RelativePoseError> {
     let sigma_px = check_noise(options.max_error_px, options.sigma_px)?;
     options.ransac.check()?;
-    let known = options.known()?;
+    // Taken out here, where the compiler still sees the options.
+    let (planes, known) = (options.planes, options.known()?);
     let lens = load(camera1, camera2, x1, x2, &guide, workspace)?;
     // In place of the result, for a verdict is large.
     let mut result = Ok(RelativePoseEstimate {
@@ -262,10 +270,14 @@ pub fn relative_pose_guided<T: Real>(
     if let Ok(found) = &mut result {
         match lens {
             Lens::Rectilinear(units) => {
-                estimate::<T, PlaneBlock<T>>(units, sigma_px, options, known, guide, workspace, found);
+                estimate::<T, PlaneBlock<T>>(
+                    units, sigma_px, options, planes, known, guide, workspace, found,
+                );
             }
             Lens::Wide(units) => {
-                estimate::<T, BearingBlock<T>>(units, sigma_px, options, known, guide, workspace, found);
+                estimate::<T, BearingBlock<T>>(
+                    units, sigma_px, options, planes, known, guide, workspace, found,
+                );
             }
         }
     }
@@ -424,6 +436,7 @@ fn estimate<T: Real, B: EpipolarBlock<T>>(
     units: Units<T>,
     sigma_px: T,
     options: &RelativePoseOptions<T>,
+    planes: bool,
     known: Option<KnownRotation<T>>,
     guide: Guide<'_, T>,
     workspace: &mut RelativePoseWorkspace<'_, T>,
@@ -433,27 +446,27 @@ fn estimate<T: Real, B: EpipolarBlock<T>>(
         Some(known) => {
             let search =
                 |judge: &Judge<'_, '_, T, B>, _, mask: &mut [bool], order: &mut [u32], found: &mut _| {
-                    aided::judge(judge, &known, &options.ransac, guide, mask, order, found);
+                    aided::judge(judge, &known, options, guide, mask, order, found);
                 };
-            judged(units, sigma_px, options, false, workspace, found, search);
+            judged(units, sigma_px, options, [false, planes], workspace, found, search);
         }
         None => {
             // Here, where the compiler sees whether there are scores.
             let ranked = ranked(guide.scores, workspace.order, workspace.count).is_some();
             let search =
-                |judge: &Judge<'_, '_, T, B>, ranked, mask: &mut [bool], order: &mut [u32], found: &mut _| {
-                    plain(judge, &options.ransac, ranked, guide.keep_going, mask, order, found);
+                |judge: &Judge<'_, '_, T, B>, seen, mask: &mut [bool], order: &mut [u32], found: &mut _| {
+                    plain(judge, &options.ransac, seen, guide.keep_going, mask, order, found);
                 };
-            judged(units, sigma_px, options, ranked, workspace, found, search);
+            judged(units, sigma_px, options, [ranked, planes], workspace, found, search);
         }
     }
 }
 
-/// The search without a prior, ranked by the order if that is one, and its verdict.
+/// The search without a prior, ranked by the order if that is one, and its verdict, with a look for planes or without.
 fn plain<T: Real, B: EpipolarBlock<T>>(
     judge: &Judge<'_, '_, T, B>,
     options: &RansacOptions<T>,
-    ranked: bool,
+    [ranked, planes]: [bool; 2],
     mut keep_going: Option<&mut dyn FnMut(&Progress) -> bool>,
     mask: &mut [bool],
     order: &mut [u32],
@@ -465,19 +478,19 @@ fn plain<T: Real, B: EpipolarBlock<T>>(
     found.report = consensus.report;
     let budget = options.budget.less(&consensus.report.spent);
     let searched = consensus.report.spent.iterations;
-    judge.judge(&consensus, &mut Left { searched, budget, keep_going }, mask, order, found);
+    judge.judge(&consensus, planes, &mut Left { searched, budget, keep_going }, mask, order, found);
 }
 
-/// The verdict by a way to search and judge.
+/// The verdict by a way to search and judge; what the compiler is to see of the options is passed through.
 #[inline(never)]
 fn judged<T: Real, B: EpipolarBlock<T>>(
     units: Units<T>,
     sigma_px: T,
     options: &RelativePoseOptions<T>,
-    ranked: bool,
+    seen: [bool; 2],
     workspace: &mut RelativePoseWorkspace<'_, T>,
     found: &mut RelativePoseEstimate<T>,
-    search: impl FnOnce(&Judge<'_, '_, T, B>, bool, &mut [bool], &mut [u32], &mut RelativePoseEstimate<T>),
+    search: impl FnOnce(&Judge<'_, '_, T, B>, [bool; 2], &mut [bool], &mut [u32], &mut RelativePoseEstimate<T>),
 ) {
     let count = workspace.count;
     let blocks = B::slice(workspace.numbers);
@@ -491,7 +504,7 @@ fn judged<T: Real, B: EpipolarBlock<T>>(
         seed: options.ransac.seed,
     };
     let mask = workspace.inliers.get_mut(..count).unwrap_or_default();
-    search(&judge, ranked, mask, workspace.order, found);
+    search(&judge, seen, mask, workspace.order, found);
     found.report.inliers = mask.iter().map(|&inlier| inlier as u32).sum();
     found.noise_px *= units.pixels;
 }

@@ -195,7 +195,9 @@ impl<T: Real> KnownRotation<T> {
     /// How the prior agrees with a verdict that was found without it; none where the verdict knows of no rotation.
     pub(super) fn agreement(&self, verdict: &RelativePoseVerdict<T>) -> Option<PriorFit<T>> {
         match verdict {
-            RelativePoseVerdict::General(motion) => self.fit_of(&motion.pose.rotation, &motion.covariance),
+            RelativePoseVerdict::General(motion) | RelativePoseVerdict::GeneralOrPlanar(motion) => {
+                self.fit_of(&motion.pose.rotation, &motion.covariance)
+            }
             RelativePoseVerdict::Planar(poses) => {
                 // Whichever of the two is right: the nearer one.
                 let nearer = |best: Option<PriorFit<T>>, fit: PriorFit<T>| match best {

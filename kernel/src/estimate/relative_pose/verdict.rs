@@ -13,6 +13,10 @@ use crate::{Real, Solutions};
 pub enum RelativePoseVerdict<T: Real> {
     /// A general motion in a scene that shows it.
     General(GeneralMotion<T>),
+    /// A general motion, unless the inliers lie on a plane, which
+    /// [`RelativePoseOptions::planes`](super::RelativePoseOptions::planes) left unexamined: then the pose may be the wrong
+    /// one of two that explain the plane alike, and its covariance tells nothing of the other.
+    GeneralOrPlanar(GeneralMotion<T>),
     /// All inliers lie on one plane, or those off it speak for two motions alike: the poses that explain the plane's
     /// homography, the more likely one first. Two where both keep the points in front of the cameras.
     Planar(Solutions<PlanarPose<T>, 2>),
@@ -93,12 +97,14 @@ pub struct RelativePoseEstimate<T: Real> {
 }
 
 impl<T: Real> RelativePoseEstimate<T> {
-    /// The pose of a general motion; of a planar scene that of [`general`](Self::general), else the plane's more likely
+    /// The pose of a general motion, or of one that is general unless the scene is a plane; of a planar scene that of [`general`](Self::general), else the plane's more likely
     /// one.
     #[must_use]
     pub fn pose(&self) -> Option<Pose<T>> {
         match &self.verdict {
-            RelativePoseVerdict::General(motion) => Some(motion.pose),
+            RelativePoseVerdict::General(motion) | RelativePoseVerdict::GeneralOrPlanar(motion) => {
+                Some(motion.pose)
+            }
             RelativePoseVerdict::Planar(poses) => {
                 let planar = poses.first().map(|planar| planar.pose);
                 self.general.map(|motion| motion.pose).or(planar)

@@ -71,26 +71,31 @@ pub fn run() {
         });
     }
     let mut points = [None; N];
-    rows("estimate_relative_pose and points", Geometry::Ransac, |scene| {
-        let [x1, x2] = scene.pixels();
-        trial(
-            || {
-                let (x1, x2) = (black_box(&x1), black_box(&x2));
-                let estimate = relative_pose(&camera, &camera, x1, x2, &options, &mut workspace).ok()?;
-                let pair = ViewPair::new(&estimate.pose()?);
-                for (point, ((a, b), &inlier)) in
-                    points.iter_mut().zip(x1.iter().zip(x2).zip(workspace.inliers()))
-                {
-                    *point = None;
-                    if inlier && let (Ok(a), Ok(b)) = (camera.unproject(a), camera.unproject(b)) {
-                        *point = pair.triangulate_midpoint(&a, &b).point();
+    for planes in [true, false] {
+        options.planes = planes;
+        let name = ["estimate_relative_pose and points, no planes", "estimate_relative_pose and points"]
+            [planes as usize];
+        rows(name, Geometry::Ransac, |scene| {
+            let [x1, x2] = scene.pixels();
+            trial(
+                || {
+                    let (x1, x2) = (black_box(&x1), black_box(&x2));
+                    let estimate = relative_pose(&camera, &camera, x1, x2, &options, &mut workspace).ok()?;
+                    let pair = ViewPair::new(&estimate.pose()?);
+                    for (point, ((a, b), &inlier)) in
+                        points.iter_mut().zip(x1.iter().zip(x2).zip(workspace.inliers()))
+                    {
+                        *point = None;
+                        if inlier && let (Ok(a), Ok(b)) = (camera.unproject(a), camera.unproject(b)) {
+                            *point = pair.triangulate_midpoint(&a, &b).point();
+                        }
                     }
-                }
-                Some(estimate)
-            },
-            |estimate| rotation_error(scene, estimate.as_ref().and_then(|e| e.pose())),
-        )
-    });
+                    Some(estimate)
+                },
+                |estimate| rotation_error(scene, estimate.as_ref().and_then(|e| e.pose())),
+            )
+        });
+    }
     black_box(&points);
     let mut options = AbsolutePoseOptions::<f32>::default();
     options.max_error_px = 2.0;
