@@ -34,7 +34,7 @@ class Report(ctypes.Structure):
     _fields_ = [("residuals", ctypes.c_uint64)] + [
         (name, ctypes.c_uint32)
         for name in ("iterations", "solver_calls", "hypotheses", "refinements", "stop", "inliers")
-    ] + [(name, ctypes.c_double) for name in ("cost", "miss_probability", "excluded_inlier_ratio")]
+    ] + [(name, ctypes.c_double) for name in ("cost", "miss_probability", "excluded_inlier_ratio", "rival_share")]
 
 
 class Estimate(ctypes.Structure):

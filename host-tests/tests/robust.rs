@@ -185,8 +185,10 @@ fn a_rival_prolongs_the_search<T: Real>() {
         lines.told_apart = true;
         let rivalled = ransac(&lines, &RansacOptions::default(), None, 5, None).report;
         assert!(rivalled.spent.iterations >= once.spent.iterations && rivalled.cost <= once.cost);
+        assert!(once.rival_share == T::ZERO && (T::ZERO..=T::ONE).contains(&rivalled.rival_share));
         cases += 1;
-        longer += (rivalled.spent.iterations > once.spent.iterations) as u32;
+        longer +=
+            (rivalled.spent.iterations > once.spent.iterations && rivalled.rival_share > lit(0.9)) as u32;
     });
     assert!(longer > 0 || cases < 10);
 }

@@ -641,6 +641,9 @@ typedef struct epi_search_report_f32 {
     float miss_probability;
     // Without consensus: a larger share of inliers would have been sampled, with the confidence asked.
     float excluded_inlier_ratio;
+    // Of relative poses: what the best other solution that was met explains, as a share of what the best one does; near 1
+    // where two explain the correspondences alike, 0 where no other was met.
+    float rival_share;
 } epi_search_report_f32;
 
 // A pose into the camera, `x_cam = R X + t`; of two views, `X2 = R X1 + t`.
@@ -1071,6 +1074,9 @@ typedef struct epi_search_report_f64 {
     double miss_probability;
     // Without consensus: a larger share of inliers would have been sampled, with the confidence asked.
     double excluded_inlier_ratio;
+    // Of relative poses: what the best other solution that was met explains, as a share of what the best one does; near 1
+    // where two explain the correspondences alike, 0 where no other was met.
+    double rival_share;
 } epi_search_report_f64;
 
 // A pose into the camera, `x_cam = R X + t`; of two views, `X2 = R X1 + t`.

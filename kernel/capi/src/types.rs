@@ -107,6 +107,9 @@ pub struct SearchReport<T> {
     pub miss_probability: T,
     /// Without consensus: a larger share of inliers would have been sampled, with the confidence asked.
     pub excluded_inlier_ratio: T,
+    /// Of relative poses: what the best other solution that was met explains, as a share of what the best one does; near 1
+    /// where two explain the correspondences alike, 0 where no other was met.
+    pub rival_share: T,
 }
 
 impl<T: Real> Pose<T> {
@@ -241,6 +244,7 @@ impl<T: Real> SearchReport<T> {
             cost: T::ZERO,
             miss_probability: T::ZERO,
             excluded_inlier_ratio: T::ZERO,
+            rival_share: T::ZERO,
         }
     }
 }
@@ -268,6 +272,7 @@ impl<T: Real> From<RansacReport<T>> for SearchReport<T> {
             cost: report.cost,
             miss_probability: report.miss_probability,
             excluded_inlier_ratio: report.excluded_inlier_ratio,
+            rival_share: report.rival_share,
         }
     }
 }

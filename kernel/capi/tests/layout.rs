@@ -29,7 +29,7 @@ fn the_committed_asserts_are_those_of_rust() {
     layout!(out;
         Camera "camera": model fx fy cx cy distortion;
         RelativePoseOptions "relative_pose_options": size min_iterations max_iterations max_solver_calls max_residuals seed confidence max_error_px sigma_px least_motion_px prior_view1 prior_view2 prior_sigma_rad prior_rotation prior_covariance prior no_planes;
-        SearchReport "search_report": residuals iterations solver_calls hypotheses refinements stop inliers cost miss_probability excluded_inlier_ratio;
+        SearchReport "search_report": residuals iterations solver_calls hypotheses refinements stop inliers cost miss_probability excluded_inlier_ratio rival_share;
         Pose "pose": rotation translation;
         RelativePoseEstimate "relative_pose_estimate": report verdict unobservable pose_count prior covariance_size noise_px prior_deviations poses normals baseline_over_distance covariance;
         HomographyOptions "homography_options": size min_iterations max_iterations max_solver_calls max_residuals seed confidence max_error_px sigma_px;

@@ -64,7 +64,6 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 4> for TransferProblem<'_, T, B>
 
     // One does where most correspondences agree.
     const DISCOVERIES: u32 = 2;
-    const RIVALLED_DISCOVERIES: u32 = 4;
 
     fn count(&self) -> u32 {
         self.subset.map_or(self.data.count, <[u32]>::len) as u32

@@ -234,6 +234,11 @@ pub struct RansacReport<T> {
     pub miss_probability: T,
     /// Without consensus: a larger share of inliers than this would have been sampled, with the confidence asked.
     pub excluded_inlier_ratio: T,
+    /// What the best other solution that samples led to explains (the number of correspondences less the cost), as a share of
+    /// what the best one does: near 1 where two explain the correspondences alike, and which is right stands open. 0 where
+    /// no other was met, and of an estimator that tells none apart ([`differs`](super::Estimator::differs)), as those of
+    /// homographies, fundamental matrices and absolute poses do not.
+    pub rival_share: T,
 }
 
 impl<T: Real> RansacReport<T> {
@@ -246,6 +251,7 @@ impl<T: Real> RansacReport<T> {
             cost: T::ZERO,
             miss_probability: T::ONE,
             excluded_inlier_ratio: T::ONE,
+            rival_share: T::ZERO,
         }
     }
 }

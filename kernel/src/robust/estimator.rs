@@ -23,8 +23,8 @@ pub trait Estimator<T: Real, const S: usize> {
     /// do where most correspondences agree with the best one.
     const DISCOVERIES: u32 = 1;
 
-    /// The same where an optimum that [differs](Self::differs) from the best scores almost as well: samples of either may
-    /// be the rarer ones, and it takes more of them to know which is best.
+    /// The same where another solution ([`differs`](Self::differs)) scores almost as well: samples of either may be the
+    /// rarer ones, and it takes more of them to know which is best.
     const RIVALLED_DISCOVERIES: u32 = Self::DISCOVERIES;
 
     /// Residuals of one correspondence that [`polish`](Self::polish) and [`score`](Self::score) together evaluate at the
@@ -70,9 +70,10 @@ pub trait Estimator<T: Real, const S: usize> {
         false
     }
 
-    /// True where two optima are different solutions, not one and the same that was reached more and less exactly.
+    /// True where two optima are different solutions, not one that was reached more and less exactly; never, where solutions
+    /// are not told apart.
     fn differs(&self, _optimum: &Self::Model, _other: &Self::Model) -> bool {
-        true
+        false
     }
 
     /// True where more samples would lead to a model that is no better than this one, the best so far, for what all of

@@ -6,7 +6,7 @@ use super::sampler::Sampler;
 use super::score::{Gate, Score};
 use super::stopping::{iterations_needed, miss_probability, undetected_inlier_ratio};
 use crate::Real;
-use crate::real::{abs, from_u32, lit, max, min};
+use crate::real::{from_u32, lit, max, min};
 
 /// A sample's best hypothesis is optimised where it explains this share of what the best minimal model does: the
 /// best minimal model need not lie in the best basin.
@@ -21,7 +21,7 @@ const LONG: u32 = 256;
 /// those that differ by less than one correspondence.
 const SAME_OPTIMUM: f64 = 0.003;
 
-/// Another optimum is a rival where what it explains less than the best is smaller than this share.
+/// Another solution is a rival where what it explains less than the best is smaller than this share.
 const RIVAL: f64 = 0.1;
 
 /// What a run found, and how it went.
@@ -215,7 +215,9 @@ struct Search<'a, T> {
     /// The least consensus of any use, 0 where it is not known, and iterations for it.
     least_consensus: u32,
     least_needed: u32,
-    /// Whether another optimum came near the best.
+    /// The least cost of another solution than the best.
+    rival: T,
+    /// Whether it comes near the best.
     rivalled: bool,
     gate: Gate<T>,
     /// What may be spent when another hypothesis is looked at, and whether more has been.
@@ -255,6 +257,7 @@ impl<'a, T: Real> Search<'a, T> {
             discoveries: 0,
             least_consensus: 0,
             least_needed: u32::MAX,
+            rival: from_u32(count),
             rivalled: false,
             last_start: options.budget.max_residuals.saturating_sub(one_score),
             exhausted: options.budget.max_residuals < one_score,
@@ -369,10 +372,11 @@ impl<'a, T: Real> Search<'a, T> {
         if self.most_agree() {
             same = max(same, T::ONE);
         }
-        if let Some((best, differs)) = former {
-            let gap = abs(score.cost - best.cost);
-            self.rivalled |= differs && gap > same && gap < (all - min(score.cost, best.cost)) * lit(RIVAL);
+        if let Some((best, true)) = former {
+            self.rival = min(self.rival, max(score.cost, best.cost));
         }
+        let least = former.map_or(score.cost, |(best, _)| min(score.cost, best.cost));
+        self.rivalled = all - self.rival > (all - least) * lit(1.0 - RIVAL);
         self.discoveries = match former {
             Some((best, _)) if score.cost > best.cost + same => self.discoveries,
             Some((best, _)) if score.cost > best.cost - same => self.discoveries.saturating_add(1),
@@ -388,7 +392,9 @@ impl<'a, T: Real> Search<'a, T> {
 
     fn report(&self, best: Option<Score<T>>) -> RansacReport<T> {
         let (iterations, count, size) = (self.spent.iterations, self.count, self.size);
-        let best = best.unwrap_or(Score { cost: from_u32(count), inliers: 0 });
+        let all = from_u32(count);
+        let best = best.unwrap_or(Score { cost: all, inliers: 0 });
+        let explained = all - best.cost;
         RansacReport {
             spent: self.spent,
             stop: self.stop,
@@ -396,6 +402,7 @@ impl<'a, T: Real> Search<'a, T> {
             cost: best.cost,
             miss_probability: miss_probability(iterations, best.inliers, count, size),
             excluded_inlier_ratio: undetected_inlier_ratio(self.options.confidence, iterations, count, size),
+            rival_share: if explained > T::ZERO { (all - self.rival) / explained } else { T::ZERO },
         }
     }
 }

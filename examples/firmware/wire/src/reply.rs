@@ -74,7 +74,7 @@ pub enum Reply<'a> {
 /// The most bytes before the stuffing that an answer about so many correspondences takes.
 #[must_use]
 pub const fn reply_bytes(correspondences: usize) -> usize {
-    const HEAD: usize = 1 + 4 + 2 + 4 + 1 + 4 * 4 + 2 * 8;
+    const HEAD: usize = 1 + 4 + 2 + 4 + 1 + 4 * 4 + 2 * 8 + 4;
     const PLANAR: usize = 1 + 2 * (28 + 12 + 4 + 1 + 64 * 4) + 1 + 28 + 1 + 25 * 4;
     OVERHEAD + 2 * HEAD + PLANAR + correspondences.div_ceil(8)
 }
@@ -257,7 +257,8 @@ fn absolute<'a>(body: &mut Reader<'a>) -> Option<Answer<'a, AbsolutePoseEstimate
 fn write_head(body: &mut Body<'_>, order: Order, elapsed_us: u32, noise_px: f32, report: &RansacReport<f32>) {
     body.u8(order as u8);
     body.u32(elapsed_us);
-    let RansacReport { spent, stop, inliers, cost, miss_probability, excluded_inlier_ratio } = report;
+    let RansacReport { spent, stop, inliers, cost, miss_probability, excluded_inlier_ratio, rival_share } =
+        report;
     body.u8(match stop {
         StopReason::Confident => 0,
         StopReason::MaxIterations => 1,
@@ -271,7 +272,7 @@ fn write_head(body: &mut Body<'_>, order: Order, elapsed_us: u32, noise_px: f32,
         body.u32(*count);
     }
     body.u64(*residuals);
-    body.f32s([cost, miss_probability, excluded_inlier_ratio, &noise_px]);
+    body.f32s([cost, miss_probability, excluded_inlier_ratio, rival_share, &noise_px]);
 }
 
 fn read_head(body: &mut Reader<'_>) -> Option<(Order, u32, f32, RansacReport<f32>)> {
@@ -294,8 +295,9 @@ fn read_head(body: &mut Reader<'_>) -> Option<(Order, u32, f32, RansacReport<f32
     let (iterations, solver_calls, hypotheses) = (body.u32()?, body.u32()?, body.u32()?);
     let (refinements, best, inliers, residuals) = (body.u32()?, body.u32()?, body.u32()?, body.u64()?);
     let spent = Progress { iterations, solver_calls, hypotheses, residuals, refinements, inliers: best };
-    let [cost, miss_probability, excluded_inlier_ratio, noise_px] = body.f32s()?;
-    let report = RansacReport { spent, stop, inliers, cost, miss_probability, excluded_inlier_ratio };
+    let [cost, miss_probability, excluded_inlier_ratio, rival_share, noise_px] = body.f32s()?;
+    let report =
+        RansacReport { spent, stop, inliers, cost, miss_probability, excluded_inlier_ratio, rival_share };
     Some((order, elapsed_us, noise_px, report))
 }
 

@@ -168,7 +168,7 @@ pub(crate) fn run<T: Real>(file: &AbsoluteFile, settings: &Settings) -> Outcome 
     };
     Outcome {
         errors,
-        doubt: doubt(spread, estimate.report.inliers, rows.len()),
+        doubt: doubt(spread, &estimate.report, rows.len()),
         correspondences: rows.len(),
         inliers: estimate.report.inliers,
         iterations: estimate.report.spent.iterations,

@@ -88,10 +88,10 @@ fn pose_errors<T: Real>(pose: &Pose<T>, truth: &TruePose) -> [f64; 2] {
 type Judged = Result<([f64; 2], f64), String>;
 
 /// The doubt of an answer: its spread over the square of the share of inliers, since a wrong model's few inliers can
-/// agree very well.
-pub(crate) fn doubt(spread: f64, inliers: u32, count: usize) -> f64 {
-    let share = f64::from(inliers) / count as f64;
-    spread / (share * share)
+/// agree very well, and over what no rival explains, since a right model has no equal.
+pub(crate) fn doubt<T: Real>(spread: f64, report: &RansacReport<T>, count: usize) -> f64 {
+    let share = f64::from(report.inliers) / count as f64;
+    spread / (share * share * (1.02 - report.rival_share.to_f64()))
 }
 
 /// The root of a covariance's trace; infinite without one.
@@ -124,20 +124,20 @@ fn judge<T: Real, A, E: Display>(
     let guide = Guide { scores: None, keep_going: Some(&mut keep_going) };
     let answer = call(guide, &mut workspace);
     let milliseconds = 1e3 * start.elapsed().as_secs_f64();
-    let (inliers, iterations, errors) = match answer {
+    let (report, errors) = match answer {
         Ok(answer) => {
             let (report, errors) = read(&answer, workspace.inliers());
-            (report.inliers, report.spent.iterations, errors)
+            (Some(report), errors)
         }
-        Err(error) => (0, 0, Err(error.to_string())),
+        Err(error) => (None, Err(error.to_string())),
     };
     let (found, spread) = *errors.as_ref().unwrap_or(&([REFUSED; 2], f64::INFINITY));
     Outcome {
         errors: found,
-        doubt: doubt(spread, inliers, count),
+        doubt: report.map_or(f64::INFINITY, |report| doubt(spread, &report, count)),
         correspondences: count,
-        inliers,
-        iterations,
+        inliers: report.map_or(0, |report| report.inliers),
+        iterations: report.map_or(0, |report| report.spent.iterations),
         milliseconds,
         refusal: errors.err().unwrap_or_default(),
     }

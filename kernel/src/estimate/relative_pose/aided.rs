@@ -205,6 +205,10 @@ impl<T: Real, B: EpipolarBlock<T>, K: Minimal<T, S>, const S: usize> Estimator<T
         model.distance_sq(best) < min(lit(SAME_POSE_SQ), threshold * threshold * lit(SAME_POSE_THRESHOLDS_SQ))
     }
 
+    fn differs(&self, optimum: &PoseModel<T>, other: &PoseModel<T>) -> bool {
+        self.problem.differs(optimum, other)
+    }
+
     fn refine(&self, model: &PoseModel<T>, residuals: &mut u64) -> Option<PoseModel<T>> {
         // A polished model needs no wide stage.
         let loss = Loss::Tukey(self.problem.threshold * T::TWO);

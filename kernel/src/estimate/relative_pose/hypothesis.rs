@@ -61,10 +61,8 @@ const TURN_PASSES: u64 = TURN_SIGMAS.len() as u64 + 1;
 const TURN_SIGMAS: [u32; 5] = [64, 24, 12, 8, 5];
 /// The same for more correspondences, once that rotation is known.
 const FINE_SIGMAS: [u32; 2] = [8, 5];
-/// Poses are different solutions where their rotations are more than 5 degrees apart (the trace of the rotation between them)
-/// or their translations more than 30 (the cosine).
-const APART_TRACE: f64 = 2.9924;
-const APART_COSINE: f64 = 0.866;
+/// Squared distance beyond which poses are different solutions: some ten degrees of rotation or translation.
+const APART_SQ: f64 = 0.03;
 /// Rays closer to parallel than this many thresholds say nothing about depth.
 const PARALLEL: f64 = 1.0;
 
@@ -413,8 +411,7 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
     }
 
     fn differs(&self, optimum: &PoseModel<T>, other: &PoseModel<T>) -> bool {
-        let trace = optimum.rotation.dot(&other.rotation);
-        trace < lit(APART_TRACE) || optimum.translation.dot(&other.translation) < lit(APART_COSINE)
+        optimum.distance_sq(other) > lit(APART_SQ)
     }
 
     fn settles(&self, model: &PoseModel<T>, residuals: &mut u64) -> bool {
