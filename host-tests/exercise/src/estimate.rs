@@ -76,7 +76,7 @@ fn take<T: Real>(estimate: &RelativePoseEstimate<T>, sink: &mut Sink) {
         sink.finite(motion.covariance.iter().flatten());
     }
     sink.flag(estimate.pose().is_some());
-    sink.finite(&[estimate.noise_px]);
+    sink.finite(&[estimate.noise_px, estimate.report.rival_share]);
     sink.count(estimate.report.inliers as usize);
     match estimate.prior {
         Some(PriorFit::Fits(by)) => sink.finite(&[by]),
@@ -114,6 +114,7 @@ fn relative<T: Real>(source: &mut Source<'_>, sink: &mut Sink, workspace: &mut T
         }
         _ => None,
     };
+    options.planes = source.below(4) != 0;
     sink.count(workspace.capacity());
     sink.count(workspace.wide_capacity());
     if let Ok(estimate) = relative_pose(&camera1, &camera2, x1, x2, &options, workspace) {
