@@ -97,8 +97,8 @@ pub struct RelativePoseEstimate<T: Real> {
 }
 
 impl<T: Real> RelativePoseEstimate<T> {
-    /// The pose of a general motion, or of one that is general unless the scene is a plane; of a planar scene that of [`general`](Self::general), else the plane's more likely
-    /// one.
+    /// The pose of a general motion, or of one that is general unless the scene is a plane; of a planar scene that of
+    /// [`general`](Self::general), else the plane's more likely one.
     #[must_use]
     pub fn pose(&self) -> Option<Pose<T>> {
         match &self.verdict {
