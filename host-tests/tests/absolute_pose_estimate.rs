@@ -177,6 +177,23 @@ in_both_scalars! {
         }).assert_at_least(0.96);
     }
 
+    /// Another observation of a point is no accident, whichever pixel of that point it is paired with.
+    fn points_seen_many_times_have_a_pose<T>() {
+        share_of(30, |seed, rng| {
+            let p = problem(Shape::Volume, 1.0, 0.0, seed);
+            let (seen, known) = (p.pixels::<T>(), p.points::<T>());
+            let points: Vec<_> = (0..N).map(|k| known[k % 10]).collect();
+            let pixels: Vec<_> = (0..N)
+                .map(|k| match k / 10 {
+                    0 | 5 => seen[k % 10] + Vector2::new(rng.normal(), rng.normal()).map(lit),
+                    _ => Vector2::new(rng.range(0.0, 640.0), rng.range(0.0, 480.0)).map(lit),
+                })
+                .collect();
+            let pose = run::<T>(&pixels, &points, &options(4.0)).pose();
+            pose.is_some_and(|pose| rotation_error(&pose.rotation, &p.pose.rotation) < 0.05)
+        }).assert_at_least(0.9);
+    }
+
     fn both_searches_of_a_prior_share_one_budget<T>() {
         for_each_case(10, |seed, _| {
             let p = problem(Shape::Volume, 1.0, 0.6, seed);

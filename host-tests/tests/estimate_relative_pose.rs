@@ -362,6 +362,23 @@ fn few_wrong_matches_end_early<T: Real>() {
     assert!(share.value() >= 0.9, "{share:?}");
 }
 
+/// Repetitions of five points fix a pose but for its several solutions: sixteen points beside them tell the right one, of
+/// every second scene. All were refused where those were not asked.
+fn the_rest_of_five_repeated_points_tells<T: Real>() {
+    let share = share_of(40, |seed, rng| {
+        let problem = Scene::new(Motion::General, 200).noise_px(0.5).generate(seed);
+        let (mut x1, mut x2) = problem.pixels::<T>();
+        for k in 5..184 {
+            for x in [&mut x1, &mut x2] {
+                x[k] = x[k % 5] + Vector2::new(lit(0.5 * rng.normal()), lit(0.5 * rng.normal()));
+            }
+        }
+        let (estimate, _) = estimate_pixels(&x1, &x2, &options()).unwrap();
+        estimate.pose().is_some_and(|pose| pose_error(&pose, &problem.pose).0 < 3.0 * DEGREE)
+    });
+    assert!(share.value() >= 0.3, "{share:?}");
+}
+
 macro_rules! both {
     ($($name:ident),*) => {
         mod f32 { $(#[test] fn $name() { super::$name::<f32>() })* }
@@ -371,6 +388,7 @@ macro_rules! both {
 both!(
     recovers_general_motion,
     degenerate_scenes,
+    the_rest_of_five_repeated_points_tells,
     planar_scenes,
     planes_have_no_rival,
     planes_left_unexamined,

@@ -335,7 +335,7 @@ enum epi_stop_reason
   : uint32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
-    // The confidence was reached.
+    // The confidence was reached: of the inliers found, or that no consensus of any use is there.
     EPI_STOP_REASON_CONFIDENT = 0,
     // `max_iterations` was reached.
     EPI_STOP_REASON_MAX_ITERATIONS = 1,

@@ -84,7 +84,7 @@ pub enum Unobservable {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum StopReason {
-    /// The confidence was reached.
+    /// The confidence was reached: of the inliers found, or that no consensus of any use is there.
     Confident = 0,
     /// `max_iterations` was reached.
     MaxIterations = 1,

@@ -248,8 +248,15 @@ pub(super) fn few_distinct<T: Real, B: EpipolarBlock<T>>(
             }
         }
     }
-    let held: u32 = falling.iter().take(needed as usize - 1).filter(|&&size| size > 1).sum();
-    if total > 0 && held >= total - total / 10 {
+    let held = |points: u32| -> u32 { falling.iter().take(points as usize).filter(|&&size| size > 1).sum() };
+    let most = total - total / 10;
+    if total > 0 && held(minimal - 1) >= most {
+        return true;
+    }
+    // One more fixes the model but for its several solutions: the rest must tell the right one.
+    let wrong = (data.count as u32).saturating_sub(total);
+    let (held, rest) = (held(needed - 1), total - held(needed - 1));
+    if needed > minimal && held >= most && !beyond_chance(rest + wrong, rest, 0, accident()) {
         return true;
     }
     // Many distinct points, most of them repeated: a homography or a fundamental matrix can be bent to the others; a pose
@@ -272,7 +279,6 @@ pub(super) fn few_distinct<T: Real, B: EpipolarBlock<T>>(
             *size = 0;
         }
         rest = rest.saturating_sub(largest);
-        let wrong = (data.count as u32).saturating_sub(total);
         let repeated = largest > 1 && 2 * rest <= total;
         if repeated && !beyond_chance(rest + wrong, rest, minimal - taken, accident()) {
             return true;

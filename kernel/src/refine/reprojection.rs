@@ -59,7 +59,8 @@ pub(crate) trait ReprojectionBlock<T: Real>: Block<T> {
     /// The rows a, b, c of a lane.
     fn rows(&self, lane: usize, focal: [T; 2]) -> [[T; 3]; 3];
 
-    /// The pixels of these correspondences with the points of others: wrong correspondences.
+    /// The pixels of these correspondences with the points of others: wrong correspondences. Another observation of the same
+    /// point is none, and gets a pixel that no point reaches.
     fn mispaired(&self, other: &Self) -> Self;
 }
 
@@ -92,7 +93,13 @@ impl<T: Real> ReprojectionBlock<T> for PlanePointBlock<T> {
     }
 
     fn mispaired(&self, other: &Self) -> Self {
-        [self[0], self[1], other[2], other[3], other[4]]
+        let mut block = [self[0], self[1], other[2], other[3], other[4]];
+        for l in 0..LANES {
+            if same_point(self.points(), other.points(), l) {
+                block[0][l] = T::MAX;
+            }
+        }
+        block
     }
 }
 
@@ -126,8 +133,17 @@ impl<T: Real> ReprojectionBlock<T> for BearingPointBlock<T> {
     fn mispaired(&self, other: &Self) -> Self {
         let mut block = *self;
         (block[9], block[10], block[11]) = (other[9], other[10], other[11]);
+        for l in 0..LANES {
+            if same_point(self.points(), other.points(), l) {
+                (block[0][l], block[1][l], block[2][l]) = (T::MAX, T::MAX, T::MAX);
+            }
+        }
         block
     }
+}
+
+fn same_point<T: Real>(a: [&Lanes<T>; 3], b: [&Lanes<T>; 3], l: usize) -> bool {
+    a.iter().zip(b).all(|(a, b)| a[l] == b[l])
 }
 
 /// `R X` of four points.

@@ -77,7 +77,8 @@ pub type RelativePoseError = TwoViewError;
 /// See [`RelativePoseVerdict`]: none of them ends in a general pose, but planes where
 /// [`planes`](RelativePoseOptions::planes) leaves them unexamined, of which the verdict then says so. A plane is the verdict where it explains at least
 /// 17 in 20 inliers, or over 16 where another motion, 3 degrees away and next to one of the plane's, explains as much but for
-/// what three of them are worth; no pose of fewer than six distinct points, for five have up to ten; no motion where the mean
+/// what three of them are worth; no pose of repetitions of fewer than six points, for five have up to ten (with
+/// two in five matches wrong, and more, up to half of those scenes have one all the same); no motion where the mean
 /// square motion is below the noise, or where the views hardly differ ([`RelativePoseOptions::least_motion_px`]).
 ///
 /// # Accuracy
