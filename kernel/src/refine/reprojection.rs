@@ -143,7 +143,7 @@ impl<T: Real> ReprojectionBlock<T> for BearingPointBlock<T> {
 }
 
 fn same_point<T: Real>(a: [&Lanes<T>; 3], b: [&Lanes<T>; 3], l: usize) -> bool {
-    a.iter().zip(b).all(|(a, b)| a[l] == b[l])
+    a.iter().zip(b).all(|(a, b)| a.get(l) == b.get(l))
 }
 
 /// `R X` of four points.
