@@ -26,6 +26,7 @@ static const char *verdict_name(uint32_t verdict) {
     case EPI_RELATIVE_POSE_VERDICT_UNOBSERVABLE: return "unobservable";
     case EPI_RELATIVE_POSE_VERDICT_TOO_FEW_INLIERS: return "too few inliers";
     case EPI_RELATIVE_POSE_VERDICT_NO_CONSENSUS: return "no consensus";
+    case EPI_RELATIVE_POSE_VERDICT_GENERAL_OR_PLANAR: return "general or planar";
     default: return "unknown to this program";
     }
 }

@@ -66,20 +66,21 @@ pub type RelativePoseError = TwoViewError;
 ///
 /// # Returns
 /// A verdict with covariances, and a report; after it the workspace's `inliers()` is the mask of the verdict's model. The
-/// report's `rival_share` tells whether samples led to another pose as well, some ten degrees away or more, that explains
-/// almost as much: of poses of real pairs that were wrong by more than 5 degrees it was 0.98 in the median, of the others
-/// 0.5 to 0.7.
+/// report's `rival_share` tells whether the search's samples led to another pose as well, some ten degrees away or more,
+/// that explains almost as much: of poses of real pairs that were wrong by more than 5 degrees it was 0.98 in the median,
+/// of the others 0.5 to 0.7.
 ///
 /// # Errors
 /// [`RelativePoseError`], with everything untouched.
 ///
 /// # Degeneracies
 /// See [`RelativePoseVerdict`]: none of them ends in a general pose, but planes where
-/// [`planes`](RelativePoseOptions::planes) leaves them unexamined, of which the verdict then says so. A plane is the verdict where it explains at least
-/// 17 in 20 inliers, or over 16 where another motion, 3 degrees away and next to one of the plane's, explains as much but for
-/// what three of them are worth; no pose of repetitions of fewer than six points, for five have up to ten (with
-/// two in five matches wrong, and more, up to half of those scenes have one all the same); no motion where the mean
-/// square motion is below the noise, or where the views hardly differ ([`RelativePoseOptions::least_motion_px`]).
+/// [`planes`](RelativePoseOptions::planes) leaves them unexamined, of which the verdict then says so. A plane is the verdict
+/// where it explains at least 17 in 20 inliers, or over 16 where another motion, 3 degrees away and next to one of the
+/// plane's, explains as much but for what three of them are worth; no pose of repetitions of fewer than six points, for five
+/// have up to ten (with two in five matches wrong, and more, up to half of those scenes have one all the same); no motion
+/// where the mean square motion is below the noise, or where the views hardly differ
+/// ([`RelativePoseOptions::least_motion_px`]).
 ///
 /// # Accuracy
 /// That of a maximum-likelihood fit to the inliers (Tukey's loss, ending at six standard deviations of the noise found,
