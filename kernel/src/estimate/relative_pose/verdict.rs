@@ -100,6 +100,8 @@ impl<T: Real> RelativePoseEstimate<T> {
     /// The pose of a general motion, or of one that is general unless the scene is a plane; of a planar scene that of
     /// [`general`](Self::general), else the plane's more likely one.
     #[must_use]
+    // Called in small code: inlined, it makes a copy of the estimate that is looked at one of many pieces.
+    #[cfg_attr(small, inline(never))]
     pub fn pose(&self) -> Option<Pose<T>> {
         match &self.verdict {
             RelativePoseVerdict::General(motion) | RelativePoseVerdict::GeneralOrPlanar(motion) => {
