@@ -140,7 +140,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         match &consensus.best {
             Some((model, _)) => self.verdict(model, planes, left, mask, order, estimate),
             None => {
-                mask.iter_mut().for_each(|inlier| *inlier = false);
+                count_of(mask, false);
                 self.without_model(estimate);
             }
         }
@@ -194,7 +194,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
             } else {
                 self.without_model(estimate);
             }
-            mask.iter_mut().for_each(|inlier| *inlier = false);
+            count_of(mask, false);
             return;
         }
         estimate.noise_px = spread.noise;
@@ -367,7 +367,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
                 return motion.covariance.map(|_| motion);
             }
         }
-        mask.iter_mut().for_each(|inlier| *inlier = false);
+        count_of(mask, false);
         None
     }
 
@@ -452,6 +452,17 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     pub(super) fn transfer_problem(&self, threshold: T) -> TransferProblem<'_, T, B> {
         TransferProblem { data: self.problem.data, threshold, subset: None }
     }
+}
+
+/// The number of inliers; none where they do not stand, and then none is left. One loop for both.
+#[cfg_attr(small, inline(never))]
+pub(super) fn count_of(mask: &mut [bool], stand: bool) -> u32 {
+    let mut count = 0;
+    for inlier in mask {
+        *inlier &= stand;
+        count += *inlier as u32;
+    }
+    count
 }
 
 pub(super) fn pose_model<T: Real, B>(pose: &Pose<T>, problem: &PoseProblem<'_, T, B>) -> PoseModel<T> {

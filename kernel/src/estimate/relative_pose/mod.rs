@@ -28,7 +28,7 @@ mod verdict;
 
 use aided::ranked;
 use hypothesis::PoseProblem;
-use judge::{Judge, Left};
+use judge::{Judge, Left, count_of};
 pub use options::RelativePoseOptions;
 use prior::KnownRotation;
 pub use prior::RelativePosePrior;
@@ -464,6 +464,6 @@ fn judged<T: Real, B: EpipolarBlock<T>>(
     };
     let mask = workspace.inliers.get_mut(..count).unwrap_or_default();
     search(&judge, seen, mask, workspace.order, found);
-    found.report.inliers = mask.iter().map(|&inlier| inlier as u32).sum();
+    found.report.inliers = count_of(mask, true);
     found.noise_px *= units.pixels;
 }
