@@ -21,7 +21,6 @@ use crate::solvers::relpose_5pt;
 use super::super::chance::{EXPLAINED_SIGMAS, least_beyond_chance, line_accident};
 use super::super::degenerate::repeated;
 use super::super::stride;
-use super::planar::exchange_two;
 use super::prior::RotationPrior;
 
 /// Correspondences and what a score of them needs.
@@ -36,10 +35,12 @@ pub(super) struct PoseProblem<'a, T: Real, B> {
     /// What is known of the rotation and enters every optimisation, and the variance of a residual that it is weighed
     /// against.
     pub(super) prior: Option<(&'a dyn RotationPrior<T>, T)>,
-    /// Correspondences off a plane that holds most: two of them in every sample, if there are any. A plane leaves two poses
-    /// and, with a little noise, all between them.
-    pub(super) off_plane: &'a [u32],
+    /// What becomes of a sample before it is solved. Called through a pointer: code that looks for no plane links none of it.
+    pub(super) exchange: Option<&'a Exchange<'a>>,
 }
+
+/// Changes a sample.
+pub(super) type Exchange<'a> = dyn Fn(&mut [u32; 5]) + 'a;
 
 /// Blocks scored between two looks at the gate.
 const CHUNK: usize = 2;
@@ -70,7 +71,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
     pub(super) fn new(data: BlockSlice<'a, B>, scales: Scales<T>, threshold: T) -> Self {
         let sine = threshold * lit(PARALLEL);
         let scales = Scales { parallel_sq: sine * sine, ..scales };
-        Self { data, scales, threshold, stride: stride(data.blocks.len()), prior: None, off_plane: &[] }
+        Self { data, scales, threshold, stride: stride(data.blocks.len()), prior: None, exchange: None }
     }
 
     /// The normalised points or bearings of a correspondence; none where it is not finite.
@@ -349,8 +350,8 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
         let mut f1 = [Vector3::zeros(); 5];
         let mut f2 = [Vector3::zeros(); 5];
         let mut sample = *sample;
-        if self.off_plane.len() > 1 {
-            exchange_two(&mut sample, self.off_plane);
+        if let Some(exchange) = self.exchange {
+            exchange(&mut sample);
         }
         for ((a, b), &index) in f1.iter_mut().zip(&mut f2).zip(&sample) {
             let Some((x, y)) = self.directions(index) else { return false };

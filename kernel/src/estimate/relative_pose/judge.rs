@@ -11,6 +11,7 @@ use super::LEAST_INLIERS;
 use super::covariance::{PsiSums, Spread, covariance};
 use super::evidence::Evidence;
 use super::hypothesis::{PoseProblem, SAMPLED_BLOCKS};
+use super::planar::exchange_two;
 use super::verdict::{GeneralMotion, RelativePoseEstimate, RelativePoseVerdict, Unobservable};
 use crate::Real;
 use crate::geometry::Pose;
@@ -331,7 +332,13 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
             RansacOptions { seed: !self.seed, min_iterations: samples, budget, ..RansacOptions::default() };
         let mut ask = after(report.spent, &mut left.keep_going);
         let keep_going = ask.as_mut().map(|ask| ask as &mut dyn FnMut(&_) -> bool);
-        let problem = PoseProblem { off_plane, ..*self.problem };
+        // A plane leaves two poses and, with a little noise, all between them: two of every sample lie off it, if there are any.
+        let exchange = |sample: &mut [u32; 5]| {
+            if off_plane.len() > 1 {
+                exchange_two(sample, off_plane);
+            }
+        };
+        let problem = PoseProblem { exchange: Some(&exchange), ..*self.problem };
         let found = ransac::<T, _, 5>(&problem, &options, None, LEAST_INLIERS, keep_going);
         report.spent = report.spent.plus(&found.report.spent);
         report.stop = match found.report.stop {
