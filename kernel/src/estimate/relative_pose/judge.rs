@@ -381,16 +381,9 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     /// A refined pose with its covariance, and how a prior that took part agrees.
     fn motion(&self, refined: &Refined<T>, spread: &Spread<T>) -> (GeneralMotion<T>, Option<PriorFit<T>>) {
         let (model, mut sums) = (&refined.model, refined.equations);
-        let mut fit = None;
-        if let Some((known, variance)) = &self.problem.prior {
-            // What the correspondences say alone, by a Newton step.
-            known.add(&mut sums, &model.rotation, -min(*variance, refined.variance));
-            let gradient = sums.gradient;
-            sums.gradient *= spread.bend;
-            fit = known.agreement(&sums, &model.rotation, spread.variance);
-            sums.gradient = gradient;
-            known.add(&mut sums, &model.rotation, spread.variance);
-        }
+        let fit = self.problem.prior.and_then(|(known, variance)| {
+            known.agreement(&mut sums, &model.rotation, min(variance, refined.variance), spread)
+        });
         let covariance = covariance(&sums, spread.variance);
         (GeneralMotion { pose: model.pose(), covariance }, fit)
     }

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
 
 use super::super::prior::{Direction, PriorFit};
+use super::covariance::Spread;
 use super::verdict::{GeneralMotion, RelativePoseVerdict};
 use crate::Real;
 use crate::geometry::pose::{log, quaternion_from_matrix, rotation_matrix, skew, tangent_basis};
@@ -45,13 +46,15 @@ pub(super) trait RotationPrior<T: Real> {
     fn add(&self, sums: &mut NormalEquations<T, 5>, rotation: &Matrix3<T>, variance: T);
     /// The squared deviation of a rotation from the prior, in units of the prior's covariance.
     fn cost(&self, rotation: &Matrix3<T>) -> T;
-    /// How the prior agrees with what the correspondences say without it: by the step from a pose in which it took part that
-    /// their equations alone ask for; none where they leave a direction open.
+    /// How the prior agrees with what the correspondences say without it: by the step from a pose in which it took part, as in
+    /// `sums` with the variance `assumed`, that their equations alone ask for; none where they leave a direction open. In
+    /// `sums` it then takes part with the variance found.
     fn agreement(
         &self,
-        alone: &NormalEquations<T, 5>,
+        sums: &mut NormalEquations<T, 5>,
         rotation: &Matrix3<T>,
-        variance: T,
+        assumed: T,
+        found: &Spread<T>,
     ) -> Option<PriorFit<T>>;
 }
 
@@ -100,16 +103,21 @@ impl<T: Real> RotationPrior<T> for KnownRotation<T> {
 
     fn agreement(
         &self,
-        alone: &NormalEquations<T, 5>,
+        sums: &mut NormalEquations<T, 5>,
         rotation: &Matrix3<T>,
-        variance: T,
+        assumed: T,
+        found: &Spread<T>,
     ) -> Option<PriorFit<T>> {
-        let factors = Ldlt::new(&alone.hessian)?;
-        let step = -factors.solve(&alone.gradient);
-        let [x, y, z, ..] = step.data.0[0];
-        let rotation = cayley(&Vector3::new(x, y, z)) * rotation;
-        let covariance = rotation_block(&(factors.inverse() * variance));
-        Some(self.fit(&rotation, &covariance))
+        self.add(sums, rotation, -assumed);
+        // By a Newton step.
+        let fit = Ldlt::new(&sums.hessian).map(|factors| {
+            let step = -factors.solve(&(sums.gradient * found.bend));
+            let [x, y, z, ..] = step.data.0[0];
+            let alone = cayley(&Vector3::new(x, y, z)) * rotation;
+            self.fit(&alone, &rotation_block(&(factors.inverse() * found.variance)))
+        });
+        self.add(sums, rotation, found.variance);
+        fit
     }
 }
 
