@@ -70,7 +70,12 @@ pub(super) struct Evidence<'a, 'b, T: Real, B> {
 impl<T: Real, B: EpipolarBlock<T>> Evidence<'_, '_, T, B> {
     /// How a model `x2 ~ H x1` explains the inliers.
     pub(super) fn explained(&self, h: &Matrix3<T>) -> Explained<T> {
-        let scale = T::ONE / (self.sigma * self.sigma);
+        self.explained_within(h, self.sigma)
+    }
+
+    /// The same with another standard deviation.
+    pub(super) fn explained_within(&self, h: &Matrix3<T>, sigma: T) -> Explained<T> {
+        let scale = T::ONE / (sigma * sigma);
         let limit: T = lit(EXPLAINED_SIGMAS * EXPLAINED_SIGMAS);
         let mut result = Explained { all: 0, inliers: 0, others: 0, squares: T::ZERO, across: T::ZERO };
         let mut mask = self.inliers.iter();

@@ -19,7 +19,7 @@ use crate::geometry::pose::rotation_matrix;
 use crate::linalg::LANES;
 use crate::real::{from_u32, lit, max, min, sqrt};
 use crate::refine::blocks::EpipolarBlock;
-use crate::refine::homography::{RotationModel, transfer_sq};
+use crate::refine::homography::transfer_sq;
 use crate::refine::lm::{Manifold, Minimum, NormalEquations};
 use crate::refine::relative_pose::PoseModel;
 use crate::robust::budget::after;
@@ -212,14 +212,13 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         }
         let evidence = Evidence { problem, inliers: mask, epipolar: refined.model.matrix(), sigma };
         if self.hardly_moves(&evidence) {
-            let still = RotationModel { rotation: Matrix3::identity(), scales: problem.scales };
-            return self.turned(&still, true, self.least_motion / lit(EXPLAINED_SIGMAS), mask, estimate);
+            return self.turned(None, self.least_motion / lit(EXPLAINED_SIGMAS), mask, estimate);
         }
         if let Some(rotation) = problem.rotation(&refined.model, sigma, SAMPLED_BLOCKS) {
             let explained = evidence.explained(&rotation.matrix());
             if !evidence.proves_parallax(count, &explained, 3, accident(), lit(ROTATION_ACCIDENTS)) {
-                let still = self.stands_still(&evidence, &rotation, &explained);
-                return self.turned(&rotation, still, sigma, mask, estimate);
+                let still = self.stands_still(&evidence, &explained);
+                return self.turned((!still).then_some(&rotation), sigma, mask, estimate);
             }
         }
         // Where most correspondences agree, the pose and its plane are known well after few passes.
