@@ -139,26 +139,23 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
     }
 
     /// The rotation that explains the inliers of a pose best, by alternating between the closest rotation of all that are
-    /// explained and the choice of those, on a few blocks and then on so many; none where they leave one open, or where less
+    /// explained and the choice of those, on a few blocks and then on more; none where they leave one open, or where less
     /// than half of them turn.
-    pub(super) fn rotation(&self, pose: &PoseModel<T>, sigma: T, blocks: usize) -> Option<RotationModel<T>> {
-        let start = RotationModel { rotation: pose.rotation, scales: pose.scales };
-        let turned = self.nearest(&start, &self.agreeing(pose, TURNED_BLOCKS), &TURN_SIGMAS, sigma)?;
-        if blocks <= TURNED_BLOCKS {
-            return Some(turned);
-        }
-        self.nearest(&turned, &self.agreeing(pose, blocks), &FINE_SIGMAS, sigma)
+    pub(super) fn rotation(&self, pose: &PoseModel<T>, sigma: T) -> Option<RotationModel<T>> {
+        let few = self.agreeing(pose, TURNED_BLOCKS);
+        let turned = self.nearest(&pose.rotation, &few, &TURN_SIGMAS, sigma)?;
+        self.nearest(&turned.rotation, &self.agreeing(pose, SAMPLED_BLOCKS), &FINE_SIGMAS, sigma)
     }
 
     /// A rotation near `start` that a sample's correspondences leave after so many choices of them; none as above.
     fn nearest(
         &self,
-        start: &RotationModel<T>,
+        start: &Matrix3<T>,
         sample: &Agreeing,
         sigmas: &[u32],
         sigma: T,
     ) -> Option<RotationModel<T>> {
-        let mut model = *start;
+        let mut model = RotationModel { rotation: *start, scales: self.scales };
         let (s1, s2) = (model.scales.inverse1(), model.scales.inverse2());
         for &factor in sigmas {
             let limit = from_u32::<T>(factor) * sigma;
@@ -228,12 +225,13 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
     /// True where a rotation explains what a pose does: then the optima of poses are many, and none is better than the
     /// others.
     fn turns(&self, pose: &PoseModel<T>) -> bool {
+        let sample = self.agreeing(pose, TURNED_BLOCKS);
         // A threshold is two standard deviations.
-        let Some(rotation) = self.rotation(pose, self.threshold * T::HALF, TURNED_BLOCKS) else {
+        let sigma = self.threshold * T::HALF;
+        let Some(rotation) = self.nearest(&pose.rotation, &sample, &TURN_SIGMAS, sigma) else {
             return false;
         };
         let limit = self.threshold * self.threshold * lit(EXPLAINED_SIGMAS * EXPLAINED_SIGMAS * 0.25);
-        let sample = self.agreeing(pose, TURNED_BLOCKS);
         self.turned(&sample, &rotation, limit, |_, _| ()) * 10 >= sample.count * 9
     }
 

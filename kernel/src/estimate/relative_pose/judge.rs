@@ -10,7 +10,7 @@ use super::super::prior::PriorFit;
 use super::LEAST_INLIERS;
 use super::covariance::{PsiSums, Spread, covariance};
 use super::evidence::Evidence;
-use super::hypothesis::{PoseProblem, SAMPLED_BLOCKS};
+use super::hypothesis::PoseProblem;
 use super::planar::exchange_two;
 use super::verdict::{GeneralMotion, RelativePoseEstimate, RelativePoseVerdict, Unobservable};
 use crate::Real;
@@ -214,7 +214,7 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         if self.hardly_moves(&evidence) {
             return self.turned(None, self.least_motion / lit(EXPLAINED_SIGMAS), mask, estimate);
         }
-        if let Some(rotation) = problem.rotation(&refined.model, sigma, SAMPLED_BLOCKS) {
+        if let Some(rotation) = problem.rotation(&refined.model, sigma) {
             let explained = evidence.explained(&rotation.matrix());
             if !evidence.proves_parallax(count, &explained, 3, accident(), lit(ROTATION_ACCIDENTS)) {
                 let still = self.stands_still(&evidence, &explained);
