@@ -322,17 +322,17 @@ fn budgets<T: Real>() {
     // over 64 correspondences to try a rotation.
     for budget in [0, 100, 119, 120, 1_000, 2_345, 5_000, 20_000, 50_000] {
         for outliers in [0.1, 0.5, 0.9] {
-            let problem = noisy(Motion::General, Shape::Volume).outliers(outliers).generate(budget);
+            let problem = noisy(Motion::General, Shape::Volume).outliers(outliers).generate(budget.into());
             options.ransac.budget.max_residuals = budget;
             let (estimate, _) = estimate_scene(&problem, &options).unwrap();
             let spent = estimate.report.spent;
-            let beyond = (5 + 1) * problem.x1.len() as u64 + 7 * 64;
+            let beyond = (5 + 1) * problem.x1.len() as u32 + 7 * 64;
             assert!(spent.residuals <= budget + beyond, "{budget}: {spent:?}");
             // Less than a residual of every correspondence scores nothing.
             assert!(budget >= 120 || (spent.residuals, estimate.pose()) == (0, None));
         }
     }
-    options.ransac.budget.max_residuals = u64::MAX;
+    options.ransac.budget.max_residuals = u32::MAX;
     options.ransac.budget.max_solver_calls = 13;
     let (estimate, _) = estimate_scene(&problem, &options).unwrap();
     assert_eq!((estimate.report.stop, estimate.report.spent.solver_calls), (StopReason::MaxSolverCalls, 13));

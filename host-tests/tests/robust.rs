@@ -64,7 +64,7 @@ impl<T: Real> Estimator<T, 2> for Line<T> {
                 *s = self.squared(*model, p);
             }
             tally.add_first(&squared, chunk.len());
-            counts.residuals += chunk.len() as u64;
+            counts.residuals += chunk.len() as u32;
             if gate.rejects(tally.cost(), tally.inliers(), lit((LANES * (k + 1)) as f64)) {
                 return None;
             }
@@ -72,8 +72,8 @@ impl<T: Real> Estimator<T, 2> for Line<T> {
         Some(tally.score())
     }
 
-    fn refine(&self, &(a, b): &(T, T), residuals: &mut u64) -> Option<(T, T)> {
-        *residuals += self.points.len() as u64;
+    fn refine(&self, &(a, b): &(T, T), residuals: &mut u32) -> Option<(T, T)> {
+        *residuals += self.points.len() as u32;
         let near = self.points.iter().filter(|&&p| self.squared((a, b), p) < T::ONE);
         let (mut n, mut sx, mut sy, mut sxx, mut sxy) = (T::ZERO, T::ZERO, T::ZERO, T::ZERO, T::ZERO);
         for &(x, y) in near {
@@ -162,7 +162,7 @@ impl<T: Real> Estimator<T, 2> for Lines<T> {
         self.line.score(model, gate, counts)
     }
 
-    fn refine(&self, model: &(T, T), residuals: &mut u64) -> Option<(T, T)> {
+    fn refine(&self, model: &(T, T), residuals: &mut u32) -> Option<(T, T)> {
         self.line.refine(model, residuals)
     }
 

@@ -105,14 +105,14 @@ impl<T: Real> Estimator<T, 2> for Location<T> {
             score.inliers += u32::from(squared < T::ONE);
             counts.residuals += 1;
             if gate.rejects(score.cost, from_u32(score.inliers), from_u32(seen)) {
-                counts.rejected_residuals += u64::from(seen);
+                counts.rejected_residuals += seen;
                 return None;
             }
         }
         Some(score)
     }
 
-    fn refine(&self, model: &T, residuals: &mut u64) -> Option<T> {
+    fn refine(&self, model: &T, residuals: &mut u32) -> Option<T> {
         *residuals += 20;
         Some(*model)
     }

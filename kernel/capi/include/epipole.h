@@ -588,7 +588,7 @@ typedef struct epi_relative_pose_options_f32 {
     uint32_t max_iterations;
     // Minimal problems solved at the most.
     uint32_t max_solver_calls;
-    // Residuals evaluated at the most.
+    // Residuals evaluated at the most; 2^32 - 1 and more: no limit but that.
     uint64_t max_residuals;
     // The same seed and input give the same bits.
     uint64_t seed;
@@ -711,7 +711,7 @@ typedef struct epi_homography_options_f32 {
     uint32_t max_iterations;
     // Minimal problems solved at the most.
     uint32_t max_solver_calls;
-    // Residuals evaluated at the most.
+    // Residuals evaluated at the most; 2^32 - 1 and more: no limit but that.
     uint64_t max_residuals;
     // The same seed and input give the same bits.
     uint64_t seed;
@@ -753,7 +753,7 @@ typedef struct epi_fundamental_options_f32 {
     uint32_t max_iterations;
     // Minimal problems solved at the most.
     uint32_t max_solver_calls;
-    // Residuals evaluated at the most.
+    // Residuals evaluated at the most; 2^32 - 1 and more: no limit but that.
     uint64_t max_residuals;
     // The same seed and input give the same bits.
     uint64_t seed;
@@ -789,7 +789,7 @@ typedef struct epi_absolute_pose_options_f32 {
     uint32_t max_iterations;
     // Minimal problems solved at the most.
     uint32_t max_solver_calls;
-    // Residuals evaluated at the most.
+    // Residuals evaluated at the most; 2^32 - 1 and more: no limit but that.
     uint64_t max_residuals;
     // The same seed and input give the same bits.
     uint64_t seed;
@@ -1021,7 +1021,7 @@ typedef struct epi_relative_pose_options_f64 {
     uint32_t max_iterations;
     // Minimal problems solved at the most.
     uint32_t max_solver_calls;
-    // Residuals evaluated at the most.
+    // Residuals evaluated at the most; 2^32 - 1 and more: no limit but that.
     uint64_t max_residuals;
     // The same seed and input give the same bits.
     uint64_t seed;
@@ -1140,7 +1140,7 @@ typedef struct epi_homography_options_f64 {
     uint32_t max_iterations;
     // Minimal problems solved at the most.
     uint32_t max_solver_calls;
-    // Residuals evaluated at the most.
+    // Residuals evaluated at the most; 2^32 - 1 and more: no limit but that.
     uint64_t max_residuals;
     // The same seed and input give the same bits.
     uint64_t seed;
@@ -1182,7 +1182,7 @@ typedef struct epi_fundamental_options_f64 {
     uint32_t max_iterations;
     // Minimal problems solved at the most.
     uint32_t max_solver_calls;
-    // Residuals evaluated at the most.
+    // Residuals evaluated at the most; 2^32 - 1 and more: no limit but that.
     uint64_t max_residuals;
     // The same seed and input give the same bits.
     uint64_t seed;
@@ -1218,7 +1218,7 @@ typedef struct epi_absolute_pose_options_f64 {
     uint32_t max_iterations;
     // Minimal problems solved at the most.
     uint32_t max_solver_calls;
-    // Residuals evaluated at the most.
+    // Residuals evaluated at the most; 2^32 - 1 and more: no limit but that.
     uint64_t max_residuals;
     // The same seed and input give the same bits.
     uint64_t seed;

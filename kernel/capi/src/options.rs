@@ -22,7 +22,7 @@ pub struct RelativePoseOptions<T> {
     pub max_iterations: u32,
     /// Minimal problems solved at the most.
     pub max_solver_calls: u32,
-    /// Residuals evaluated at the most.
+    /// Residuals evaluated at the most; 2^32 - 1 and more: no limit but that.
     pub max_residuals: u64,
     /// The same seed and input give the same bits.
     pub seed: u64,
@@ -65,7 +65,7 @@ pub struct HomographyOptions<T> {
     pub max_iterations: u32,
     /// Minimal problems solved at the most.
     pub max_solver_calls: u32,
-    /// Residuals evaluated at the most.
+    /// Residuals evaluated at the most; 2^32 - 1 and more: no limit but that.
     pub max_residuals: u64,
     /// The same seed and input give the same bits.
     pub seed: u64,
@@ -89,7 +89,7 @@ pub struct FundamentalOptions<T> {
     pub max_iterations: u32,
     /// Minimal problems solved at the most.
     pub max_solver_calls: u32,
-    /// Residuals evaluated at the most.
+    /// Residuals evaluated at the most; 2^32 - 1 and more: no limit but that.
     pub max_residuals: u64,
     /// The same seed and input give the same bits.
     pub seed: u64,
@@ -113,7 +113,7 @@ pub struct AbsolutePoseOptions<T> {
     pub max_iterations: u32,
     /// Minimal problems solved at the most.
     pub max_solver_calls: u32,
-    /// Residuals evaluated at the most.
+    /// Residuals evaluated at the most; 2^32 - 1 and more: no limit but that.
     pub max_residuals: u64,
     /// The same seed and input give the same bits.
     pub seed: u64,
@@ -206,7 +206,7 @@ macro_rules! search_options {
                     min_iterations: search.min_iterations,
                     max_iterations: search.budget.max_iterations,
                     max_solver_calls: search.budget.max_solver_calls,
-                    max_residuals: search.budget.max_residuals,
+                    max_residuals: search.budget.max_residuals as u64,
                     seed: search.seed,
                     confidence: search.confidence,
                     max_error_px: kernel.max_error_px,
@@ -228,7 +228,7 @@ macro_rules! search_options {
                 kernel.ransac.seed = self.seed;
                 kernel.ransac.budget.max_iterations = self.max_iterations;
                 kernel.ransac.budget.max_solver_calls = self.max_solver_calls;
-                kernel.ransac.budget.max_residuals = self.max_residuals;
+                kernel.ransac.budget.max_residuals = u32::try_from(self.max_residuals).unwrap_or(u32::MAX);
                 kernel
             }
         }

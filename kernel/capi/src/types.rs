@@ -262,7 +262,7 @@ impl<T: Real> From<RansacReport<T>> for SearchReport<T> {
             _ => C::Other,
         };
         Self {
-            residuals: report.spent.residuals,
+            residuals: report.spent.residuals as u64,
             iterations: report.spent.iterations,
             solver_calls: report.spent.solver_calls,
             hypotheses: report.spent.hypotheses,

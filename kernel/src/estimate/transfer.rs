@@ -112,24 +112,22 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 4> for TransferProblem<'_, T, B>
                 at -= blocks.len();
             }
             if k % 2 == 1 && gate.rejects(tally.cost(), tally.inliers(), from_u32(seen)) {
-                counts.residuals += seen as u64;
-                counts.rejected_residuals += seen as u64;
-                counts.rejected_inliers += tally.inliers().to_u32() as u64;
+                counts.add_rejected(seen, tally.inliers().to_u32());
                 return None;
             }
         }
-        counts.residuals += seen as u64;
+        counts.add(seen);
         let mut score = tally.score();
         score.inliers = core::cmp::min(score.inliers, self.count());
         Some(score)
     }
 
-    fn refine(&self, model: &HomographyModel<T>, residuals: &mut u64) -> Option<HomographyModel<T>> {
+    fn refine(&self, model: &HomographyModel<T>, residuals: &mut u32) -> Option<HomographyModel<T>> {
         // A minimal model is off by more than the noise: what lies within twice the threshold takes part, at a weight that
         // falls with the error. The caller polishes the best.
         let loss = Loss::Tukey(self.threshold * T::TWO);
         let minimum = self.optimise(model, &loss, LOCAL_PASSES, lit(1e-2));
-        *residuals += minimum.passes as u64 * self.data.count as u64;
+        *residuals = residuals.saturating_add(minimum.passes.saturating_mul(self.data.count as u32));
         HomographyModel::new(&minimum.model.0)
     }
 }

@@ -24,7 +24,7 @@ pub struct RansacOptions<T> {
     pub seed: u64,
 }
 
-/// Upper limits of a run; `u32::MAX` and `u64::MAX` mean none.
+/// Upper limits of a run; `u32::MAX` stands for none, for counts end there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -33,15 +33,16 @@ pub struct Budget {
     pub max_iterations: u32,
     /// Minimal problems solved (degenerate samples cost none). Default: no limit.
     pub max_solver_calls: u32,
-    /// Residuals evaluated, of one correspondence under one model each. Default: no limit. The search stays
-    /// within it but for one local optimisation; a hypothesis is looked at where two residuals of every correspondence are
-    /// left (four where hypotheses are polished: a relative pose with a prior), so that less than that scores nothing.
-    pub max_residuals: u64,
+    /// Residuals evaluated, of one correspondence under one model each. Default: no limit but 4.29e9, where the count
+    /// ends. The search stays within it but for one local optimisation; a hypothesis is looked at where two residuals of
+    /// every correspondence are left (four where hypotheses are polished: a relative pose with a prior), so that less than
+    /// that scores nothing.
+    pub max_residuals: u32,
 }
 
 impl Default for Budget {
     fn default() -> Self {
-        Self { max_iterations: 10_000, max_solver_calls: u32::MAX, max_residuals: u64::MAX }
+        Self { max_iterations: 10_000, max_solver_calls: u32::MAX, max_residuals: u32::MAX }
     }
 }
 
@@ -174,7 +175,7 @@ pub struct Progress {
     /// Hypotheses scored.
     pub hypotheses: u32,
     /// Residuals evaluated.
-    pub residuals: u64,
+    pub residuals: u32,
     /// Local optimisations made.
     pub refinements: u32,
     /// Inliers of the best model.

@@ -56,7 +56,7 @@ pub trait Estimator<T: Real, const S: usize> {
     fn score(&self, model: &Self::Model, gate: &Gate<T>, counts: &mut ScoreCounts) -> Option<Score<T>>;
 
     /// The model after local optimisation on its inliers; none where that failed. Adds the residuals evaluated.
-    fn refine(&self, model: &Self::Model, residuals: &mut u64) -> Option<Self::Model>;
+    fn refine(&self, model: &Self::Model, residuals: &mut u32) -> Option<Self::Model>;
 
     /// True where a sample is not worth its model, because it would lead to `best`, the best model so far, again.
     fn repeats(&self, _sample: &[u32; S], _best: &Self::Model) -> bool {
@@ -78,7 +78,7 @@ pub trait Estimator<T: Real, const S: usize> {
 
     /// True where more samples would lead to a model that is no better than this one, the best so far, for what all of
     /// them tell: then [`DISCOVERIES`](Self::DISCOVERIES) asks for no more. Adds the residuals evaluated.
-    fn settles(&self, _model: &Self::Model, _residuals: &mut u64) -> bool {
+    fn settles(&self, _model: &Self::Model, _residuals: &mut u32) -> bool {
         false
     }
 
@@ -93,9 +93,25 @@ pub trait Estimator<T: Real, const S: usize> {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ScoreCounts {
     /// Residuals evaluated.
-    pub residuals: u64,
+    pub residuals: u32,
     /// Residuals evaluated of rejected models.
-    pub rejected_residuals: u64,
+    pub rejected_residuals: u32,
     /// Inliers among those.
-    pub rejected_inliers: u64,
+    pub rejected_inliers: u32,
+}
+
+impl ScoreCounts {
+    /// Adds a model's residuals.
+    pub(crate) fn add(&mut self, residuals: u32) {
+        self.residuals = self.residuals.saturating_add(residuals);
+    }
+
+    /// Adds a rejected model's; the share of its inliers is not asked more exactly than by 32 bits of them.
+    pub(crate) fn add_rejected(&mut self, residuals: u32, inliers: u32) {
+        self.add(residuals);
+        if let Some(sum) = self.rejected_residuals.checked_add(residuals) {
+            self.rejected_residuals = sum;
+            self.rejected_inliers += inliers;
+        }
+    }
 }

@@ -85,7 +85,7 @@ pub struct Consensus<M, T> {
 ///     }
 ///
 ///     fn score(&self, model: &(f32, f32), gate: &Gate<f32>, counts: &mut ScoreCounts) -> Option<Score<f32>> {
-///         counts.residuals += self.0.len() as u64;
+///         counts.residuals += self.0.len() as u32;
 ///         let mut score = Score { cost: 0.0, inliers: 0 };
 ///         for (x, y) in self.0 {
 ///             let squared = ((model.0 + model.1 * x - y) / 0.1).powi(2);
@@ -95,7 +95,7 @@ pub struct Consensus<M, T> {
 ///         (score.cost <= gate.bound).then_some(score)
 ///     }
 ///
-///     fn refine(&self, _: &(f32, f32), _: &mut u64) -> Option<(f32, f32)> {
+///     fn refine(&self, _: &(f32, f32), _: &mut u32) -> Option<(f32, f32)> {
 ///         None
 ///     }
 /// }
@@ -206,7 +206,7 @@ struct Search<'a, T> {
     sampler: Sampler<T>,
     spent: Progress,
     counts: ScoreCounts,
-    refined_residuals: u64,
+    refined_residuals: u32,
     /// Of the best minimal model.
     minimal: Score<T>,
     /// Iterations for the best optimised model.
@@ -221,7 +221,7 @@ struct Search<'a, T> {
     rivalled: bool,
     gate: Gate<T>,
     /// What may be spent when another hypothesis is looked at, and whether more has been.
-    last_start: u64,
+    last_start: u32,
     exhausted: bool,
     stop: StopReason,
 }
@@ -236,7 +236,7 @@ impl<'a, T: Real> Search<'a, T> {
         manners: Manners,
     ) -> Self {
         let counts = ScoreCounts::default();
-        let one_score = manners.score_passes as u64 * count as u64;
+        let one_score = manners.score_passes.saturating_mul(count);
         Self {
             options,
             count,
@@ -344,7 +344,8 @@ impl<'a, T: Real> Search<'a, T> {
     /// Whether another hypothesis is looked at, which is then counted.
     #[inline]
     fn takes_hypothesis(&mut self) -> bool {
-        self.exhausted |= self.counts.residuals + self.refined_residuals > self.last_start;
+        self.add_up();
+        self.exhausted |= self.spent.residuals > self.last_start;
         self.spent.hypotheses += !self.exhausted as u32;
         !self.exhausted
     }
@@ -362,7 +363,7 @@ impl<'a, T: Real> Search<'a, T> {
     }
 
     fn add_up(&mut self) {
-        self.spent.residuals = self.counts.residuals + self.refined_residuals;
+        self.spent.residuals = self.counts.residuals.saturating_add(self.refined_residuals);
     }
 
     /// After another optimum has been found; `former` is the best one before, and whether the two are different solutions.
@@ -419,9 +420,6 @@ fn wrong_share<T: Real>(counts: &ScoreCounts) -> T {
     if counts.rejected_residuals < 500 {
         return lit(0.05);
     }
-    // Halved until they fit 32 bits.
-    let halvings = 32u32.saturating_sub(counts.rejected_residuals.leading_zeros());
-    let share = |n: u64| from_u32::<T>((n >> halvings) as u32);
-    let share = share(counts.rejected_inliers) / share(counts.rejected_residuals);
+    let share = from_u32::<T>(counts.rejected_inliers) / from_u32(counts.rejected_residuals);
     max(min(share, lit(0.5)), lit(0.01))
 }

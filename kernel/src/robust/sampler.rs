@@ -35,7 +35,8 @@ const fn mix(mut z: u64) -> u64 {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Sampler<T> {
-    seed: u64,
+    /// Low and high half: on a core of 32 bits nothing of a search is then aligned to more.
+    seed: [u32; 2],
     count: u32,
     growth: Option<Growth<T>>,
 }
@@ -55,7 +56,8 @@ impl<T: Real> Sampler<T> {
     /// Samples of `count` correspondences, all alike.
     #[must_use]
     pub fn uniform(seed: u64, count: u32) -> Self {
-        Self { seed: mix(seed.wrapping_add(STEP)), count, growth: None }
+        let seed = mix(seed.wrapping_add(STEP));
+        Self { seed: [seed as u32, (seed >> 32) as u32], count, growth: None }
     }
 
     /// Samples of `count` correspondences in the order of their rank, in sets of `sample_size`.
@@ -115,7 +117,8 @@ impl<T: Real> Sampler<T> {
                 newest = Some(pool);
             }
         }
-        choose(mix(self.seed.wrapping_add((iteration as u64).wrapping_mul(STEP))), pool, newest, chosen);
+        let seed = (self.seed[1] as u64) << 32 | self.seed[0] as u64;
+        choose(mix(seed.wrapping_add((iteration as u64).wrapping_mul(STEP))), pool, newest, chosen);
         true
     }
 }

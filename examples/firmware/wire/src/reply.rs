@@ -271,7 +271,7 @@ fn write_head(body: &mut Body<'_>, order: Order, elapsed_us: u32, noise_px: f32,
     for count in [iterations, solver_calls, hypotheses, refinements, best, inliers] {
         body.u32(*count);
     }
-    body.u64(*residuals);
+    body.u64((*residuals).into());
     body.f32s([cost, miss_probability, excluded_inlier_ratio, rival_share, &noise_px]);
 }
 
@@ -293,7 +293,8 @@ fn read_head(body: &mut Reader<'_>) -> Option<(Order, u32, f32, RansacReport<f32
         _ => return None,
     };
     let (iterations, solver_calls, hypotheses) = (body.u32()?, body.u32()?, body.u32()?);
-    let (refinements, best, inliers, residuals) = (body.u32()?, body.u32()?, body.u32()?, body.u64()?);
+    let (refinements, best, inliers) = (body.u32()?, body.u32()?, body.u32()?);
+    let residuals = body.u64()?.try_into().ok()?;
     let spent = Progress { iterations, solver_calls, hypotheses, residuals, refinements, inliers: best };
     let [cost, miss_probability, excluded_inlier_ratio, rival_share, noise_px] = body.f32s()?;
     let report =

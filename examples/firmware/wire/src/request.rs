@@ -202,7 +202,7 @@ fn read_ransac(body: &mut Reader<'_>) -> Option<RansacOptions<f32>> {
     options.min_iterations = body.u32()?;
     options.budget.max_iterations = body.u32()?;
     options.budget.max_solver_calls = body.u32()?;
-    options.budget.max_residuals = body.u64()?;
+    options.budget.max_residuals = u32::try_from(body.u64()?).unwrap_or(u32::MAX);
     options.seed = body.u64()?;
     Some(options)
 }
@@ -312,7 +312,7 @@ fn write_options(
     body.u32(ransac.min_iterations);
     body.u32(ransac.budget.max_iterations);
     body.u32(ransac.budget.max_solver_calls);
-    body.u64(ransac.budget.max_residuals);
+    body.u64(ransac.budget.max_residuals.into());
     body.u64(ransac.seed);
     body.u32(deadline_us);
 }

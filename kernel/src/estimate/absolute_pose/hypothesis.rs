@@ -147,26 +147,24 @@ impl<'a, T: Real, B: ReprojectionBlock<T>> PoseProblem<'a, T, B> {
                 }
             }
             if gate.rejects(tally.cost(), tally.inliers(), from_u32(seen)) {
-                counts.residuals += seen as u64;
-                counts.rejected_residuals += seen as u64;
-                counts.rejected_inliers += tally.inliers().to_u32() as u64;
+                counts.add_rejected(seen, tally.inliers().to_u32());
                 return None;
             }
         }
-        counts.residuals += self.data.count as u64;
+        counts.add(self.data.count as u32);
         if let Some(block) = blocks.get(full) {
             tally.add_first(&self.relative(block, pose, scale), self.data.count - full * LANES);
         }
         Some(tally.score())
     }
 
-    fn refine(&self, pose: &CameraPose<T>, residuals: &mut u64) -> Option<CameraPose<T>> {
+    fn refine(&self, pose: &CameraPose<T>, residuals: &mut u32) -> Option<CameraPose<T>> {
         if self.facing < T::ZERO {
             return None;
         }
         let loss = Loss::Truncated(self.threshold);
         let minimum = self.optimise(pose, &loss, None, LOCAL_PASSES, lit(1e-4));
-        *residuals += minimum.passes as u64 * self.data.count as u64;
+        *residuals = residuals.saturating_add(minimum.passes.saturating_mul(self.data.count as u32));
         Some(minimum.model)
     }
 }
@@ -202,7 +200,7 @@ impl<T: Real, B: ReprojectionBlock<T>> Estimator<T, 3> for PoseProblem<'_, T, B>
         self.score(pose, gate, counts)
     }
 
-    fn refine(&self, pose: &CameraPose<T>, residuals: &mut u64) -> Option<CameraPose<T>> {
+    fn refine(&self, pose: &CameraPose<T>, residuals: &mut u32) -> Option<CameraPose<T>> {
         self.refine(pose, residuals)
     }
 }
@@ -245,7 +243,7 @@ impl<T: Real, B: ReprojectionBlock<T>> Estimator<T, 2> for UprightProblem<'_, T,
         self.problem.score(pose, gate, counts)
     }
 
-    fn refine(&self, pose: &CameraPose<T>, residuals: &mut u64) -> Option<CameraPose<T>> {
+    fn refine(&self, pose: &CameraPose<T>, residuals: &mut u32) -> Option<CameraPose<T>> {
         self.problem.refine(pose, residuals)
     }
 }

@@ -110,23 +110,22 @@ impl<'a, T: Real> EpipolarProblem<'a, T> {
                 }
             }
             if gate.rejects(tally.cost(), tally.inliers(), from_u32(seen)) {
-                counts.residuals += seen as u64;
-                counts.rejected_residuals += seen as u64;
-                counts.rejected_inliers += tally.inliers().to_u32() as u64;
+                counts.add_rejected(seen, tally.inliers().to_u32());
                 return None;
             }
         }
-        counts.residuals += seen as u64;
+        counts.add(seen);
         Some(tally.score())
     }
 
-    fn optimise_locally(&self, model: &FundamentalModel<T>, residuals: &mut u64) -> FundamentalModel<T> {
+    fn optimise_locally(&self, model: &FundamentalModel<T>, residuals: &mut u32) -> FundamentalModel<T> {
         // A minimal model is off by more than the noise: inliers are gathered from twice the threshold first.
         let wide = Loss::Truncated(self.threshold * T::TWO);
         let first = self.optimise(model, &wide, WIDE_PASSES, lit(1e-3));
         let loss = Loss::Truncated(self.threshold);
         let minimum = self.optimise(&first.model, &loss, LOCAL_PASSES, lit(1e-4));
-        *residuals += (first.passes + minimum.passes) as u64 * self.data.count as u64;
+        let passes = first.passes + minimum.passes;
+        *residuals = residuals.saturating_add(passes.saturating_mul(self.data.count as u32));
         minimum.model
     }
 }
@@ -177,7 +176,7 @@ impl<T: Real> Estimator<T, 7> for EpipolarProblem<'_, T> {
         self.score_within(model, gate, counts)
     }
 
-    fn refine(&self, model: &FundamentalModel<T>, residuals: &mut u64) -> Option<FundamentalModel<T>> {
+    fn refine(&self, model: &FundamentalModel<T>, residuals: &mut u32) -> Option<FundamentalModel<T>> {
         Some(self.optimise_locally(model, residuals))
     }
 }
@@ -244,7 +243,7 @@ impl<T: Real> Estimator<T, 2> for ParallaxProblem<'_, '_, T> {
         Some(score)
     }
 
-    fn refine(&self, model: &FundamentalModel<T>, residuals: &mut u64) -> Option<FundamentalModel<T>> {
+    fn refine(&self, model: &FundamentalModel<T>, residuals: &mut u32) -> Option<FundamentalModel<T>> {
         Some(self.problem.optimise_locally(model, residuals))
     }
 }

@@ -182,7 +182,7 @@ impl<T: Real, B: EpipolarBlock<T>, K: Minimal<T, S>, const S: usize> Estimator<T
         let count = from_u32::<T>(self.problem.data.count as u32);
         let share = T::ONE - bound / count;
         let support = max(share * from_u32(self.count as u32), from_u32(self.support));
-        *residuals += self.count as u64;
+        *residuals = residuals.saturating_add(self.count as u32);
         if self.problem.within(data, model, wide) < support.to_u32() {
             return None;
         }
@@ -209,7 +209,7 @@ impl<T: Real, B: EpipolarBlock<T>, K: Minimal<T, S>, const S: usize> Estimator<T
         self.problem.differs(optimum, other)
     }
 
-    fn refine(&self, model: &PoseModel<T>, residuals: &mut u64) -> Option<PoseModel<T>> {
+    fn refine(&self, model: &PoseModel<T>, residuals: &mut u32) -> Option<PoseModel<T>> {
         // A polished model needs no wide stage.
         let loss = Loss::Tukey(self.problem.threshold * T::TWO);
         self.problem.approach(self.problem.data, model, &loss, LOCAL_STEPS, 5, residuals)

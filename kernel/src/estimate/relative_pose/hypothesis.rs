@@ -56,7 +56,7 @@ pub(super) const SAMPLED_BLOCKS: usize = 64;
 /// Blocks on which it is tried whether a pose is but a rotation.
 const TURNED_BLOCKS: usize = 8;
 /// Passes over those at the most.
-const TURN_PASSES: u64 = TURN_SIGMAS.len() as u64 + 1;
+const TURN_PASSES: u32 = TURN_SIGMAS.len() as u32 + 1;
 /// Errors, in standard deviations, up to which correspondences take part in a rotation: from coarse to fine, so that a few
 /// wrong ones do not hold the rest.
 const TURN_SIGMAS: [u32; 5] = [64, 24, 12, 8, 5];
@@ -269,13 +269,13 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         loss: &Loss<T>,
         steps: u32,
         least: u32,
-        residuals: &mut u64,
+        residuals: &mut u32,
     ) -> Option<PoseModel<T>> {
         let every = data.blocks.len().div_ceil(SAMPLED_BLOCKS);
         let mut model = *model;
         for _ in 0..steps {
             let mut sums = sampled_equations(data, every, &model, loss);
-            *residuals += (data.count / core::cmp::max(every, 1)) as u64;
+            *residuals = residuals.saturating_add((data.count / core::cmp::max(every, 1)) as u32);
             if sums.active < least {
                 return None;
             }
@@ -392,17 +392,15 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
             if (k % CHUNK == 0 || k == blocks.len())
                 && gate.rejects(tally.cost(), tally.inliers(), from_u32(seen))
             {
-                counts.residuals += seen as u64;
-                counts.rejected_residuals += seen as u64;
-                counts.rejected_inliers += tally.inliers().to_u32() as u64;
+                counts.add_rejected(seen, tally.inliers().to_u32());
                 return None;
             }
         }
-        counts.residuals += seen as u64;
+        counts.add(seen);
         Some(tally.score())
     }
 
-    fn refine(&self, model: &PoseModel<T>, residuals: &mut u64) -> Option<PoseModel<T>> {
+    fn refine(&self, model: &PoseModel<T>, residuals: &mut u32) -> Option<PoseModel<T>> {
         // A minimal model is off by more than the noise: inliers are gathered from three times the threshold first.
         let (wide, narrow) = (self.threshold * lit(WIDE), self.threshold);
         let near = self.approach(self.data, model, &Loss::Truncated(wide), WIDE_STEPS, 5, residuals)?;
@@ -413,8 +411,9 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
         optimum.distance_sq(other) > lit(APART_SQ)
     }
 
-    fn settles(&self, model: &PoseModel<T>, residuals: &mut u64) -> bool {
-        *residuals += TURN_PASSES * core::cmp::min(TURNED_BLOCKS * LANES, self.data.count) as u64;
+    fn settles(&self, model: &PoseModel<T>, residuals: &mut u32) -> bool {
+        let tried = TURN_PASSES * core::cmp::min(TURNED_BLOCKS * LANES, self.data.count) as u32;
+        *residuals = residuals.saturating_add(tried);
         self.turns(model)
     }
 }
