@@ -42,7 +42,7 @@ impl<T: Real, const N: usize> Ldlt<T, N> {
     pub fn new(a: &SMatrix<T, N, N>) -> Option<Self> {
         let mut factors = Self { lower: [[T::ZERO; N]; N], inverse_d: [T::ZERO; N] };
         let Self { lower, inverse_d } = &mut factors;
-        factor(a.data.0.as_flattened(), None, lower.as_flattened_mut(), inverse_d)?;
+        factor(a.data.0.as_flattened(), T::ZERO, lower.as_flattened_mut(), inverse_d)?;
         Some(factors)
     }
 
@@ -109,7 +109,7 @@ fn scale_inverse<T: Real>(
     inverse_d: &mut [T],
     columns: &mut [T],
 ) -> Option<()> {
-    factor(a, None, lower, inverse_d)?;
+    factor(a, T::ZERO, lower, inverse_d)?;
     invert(lower, inverse_d, columns, a)?;
     a.iter_mut().for_each(|x| *x *= scale);
     Some(())
@@ -125,7 +125,7 @@ fn descend<T: Real>(
     inverse_d: &mut [T],
     x: &mut [T],
 ) -> Option<T> {
-    factor(a, Some(damping), lower, inverse_d)?;
+    factor(a, damping, lower, inverse_d)?;
     substitute(lower, inverse_d, x)?;
     let mut promise = T::ZERO;
     for (x, g) in x.iter_mut().zip(g) {
@@ -135,27 +135,25 @@ fn descend<T: Real>(
     Some(promise)
 }
 
-/// Row by row `L` and 1 / D of a matrix whose diagonal elements are larger by the share `damping` if there is one; none where
+/// Row by row `L` and 1 / D of a matrix whose diagonal elements are larger by the share `damping`; none where
 /// it is not positive definite.
 #[cfg_attr(small, inline(never))]
 #[cfg_attr(not(small), inline(always))]
-fn factor<T: Real>(a: &[T], damping: Option<T>, lower: &mut [T], inverse_d: &mut [T]) -> Option<()> {
+fn factor<T: Real>(a: &[T], damping: T, lower: &mut [T], inverse_d: &mut [T]) -> Option<()> {
     let n = inverse_d.len();
     let floor = from_u32::<T>(n as u32) * T::EPSILON;
     for i in 0..n {
         // Row i of L D first (by forward substitution), of L after the division by D.
         let (above, row) = lower.split_at_mut_checked(i * n)?;
-        for j in 0..i {
-            let mut sum = *a.get(j * n + i)?;
-            for (x, y) in row.iter().zip(above.get(j * n..)?).take(j) {
-                sum -= *x * *y;
-            }
-            *row.get_mut(j)? = sum;
+        let row = row.get_mut(..i)?;
+        for (j, x) in row.iter_mut().enumerate() {
+            *x = *a.get(j * n + i)?;
         }
+        forward(above, n, row)?;
         let diagonal = *a.get(i * n + i)?;
-        let diagonal = damping.map_or(diagonal, |damping| diagonal + damping * diagonal);
+        let diagonal = diagonal + damping * diagonal;
         let mut pivot = diagonal;
-        for (x, inverse) in row.iter_mut().zip(&*inverse_d).take(i) {
+        for (x, inverse) in row.iter_mut().zip(&*inverse_d) {
             let scaled = *x * *inverse;
             pivot -= scaled * *x;
             *x = scaled;
@@ -174,19 +172,27 @@ fn factor<T: Real>(a: &[T], damping: Option<T>, lower: &mut [T], inverse_d: &mut
 #[cfg_attr(not(small), inline(always))]
 fn substitute<T: Real>(lower: &[T], inverse_d: &[T], x: &mut [T]) -> Option<()> {
     let n = inverse_d.len();
-    for i in 0..n {
-        let (before, rest) = x.split_at_mut_checked(i)?;
-        let target = rest.first_mut()?;
-        for (l, y) in lower.get(i * n..)?.iter().zip(before) {
-            *target -= *l * *y;
-        }
-    }
+    forward(lower, n, x)?;
     for i in (0..n).rev() {
         let (before, after) = x.split_at_mut_checked(i + 1)?;
         let target = before.last_mut()?;
         *target *= *inverse_d.get(i)?;
         for (k, y) in after.iter().enumerate() {
             *target -= *lower.get((i + 1 + k) * n + i)? * *y;
+        }
+    }
+    Some(())
+}
+
+/// `x <- L^-1 x`, of an `L` whose rows begin `n` elements apart.
+#[cfg_attr(small, inline(never))]
+#[cfg_attr(not(small), inline(always))]
+fn forward<T: Real>(lower: &[T], n: usize, x: &mut [T]) -> Option<()> {
+    for i in 0..x.len() {
+        let (before, rest) = x.split_at_mut_checked(i)?;
+        let target = rest.first_mut()?;
+        for (l, y) in lower.get(i * n..)?.iter().zip(before) {
+            *target -= *l * *y;
         }
     }
     Some(())
@@ -200,19 +206,14 @@ fn invert<T: Real>(lower: &[T], inverse_d: &[T], columns: &mut [T], inverse: &mu
     for c in 0..n {
         let column = columns.get_mut(c * n..c * n + n)?;
         *column.get_mut(c)? = T::ONE;
-        for i in c + 1..n {
-            let mut sum = T::ZERO;
-            for j in c..i {
-                sum -= *lower.get(i * n + j)? * *column.get(j)?;
-            }
-            *column.get_mut(i)? = sum;
-        }
+        forward(lower, n, column)?;
     }
     for i in 0..n {
         for j in 0..=i {
             let mut sum = T::ZERO;
-            for k in i..n {
-                sum += *columns.get(i * n + k)? * *columns.get(j * n + k)? * *inverse_d.get(k)?;
+            // What lies above the diagonal is zero.
+            for ((x, y), d) in columns.get(i * n..)?.iter().zip(columns.get(j * n..)?).zip(inverse_d) {
+                sum += *x * *y * *d;
             }
             *inverse.get_mut(i * n + j)? = sum;
             *inverse.get_mut(j * n + i)? = sum;
