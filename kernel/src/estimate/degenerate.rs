@@ -46,12 +46,12 @@ fn point<T: Real, B: EpipolarBlock<T>>(data: BlockSlice<'_, B>, index: u32) -> O
 /// A line of each view: a point, and the unit normal.
 type Line<T> = [[T; 4]; 2];
 
-/// Squared distances of a point from a line of each view.
-fn distances_sq<T: Real>(p: &Point<T>, line: &Line<T>) -> [T; 2] {
-    let [c, n] = line;
+/// True where a point's squared distances from a line of each view are below a limit.
+#[cfg_attr(small, inline(never))]
+fn lies_on<T: Real>(p: &Point<T>, [c, n]: &Line<T>, limit: T) -> bool {
     let d1 = (p[0] - c[0]) * n[0] + (p[1] - c[1]) * n[1];
     let d2 = (p[2] - c[2]) * n[2] + (p[3] - c[3]) * n[3];
-    [d1 * d1, d2 * d2]
+    d1 * d1 < limit && d2 * d2 < limit
 }
 
 /// The lines through two points.
@@ -72,34 +72,35 @@ fn fit<T: Real, B: EpipolarBlock<T>>(
     line: &Line<T>,
     limit: T,
 ) -> Line<T> {
-    let on = |p: &Point<T>| distances_sq(p, line).iter().all(|d| *d < limit);
-    // Moments about the first point.
-    let mut first = None;
-    let (mut n, mut sum, mut square, mut cross) = (T::ZERO, [T::ZERO; 4], [T::ZERO; 4], [T::ZERO; 2]);
-    for p in inliers.iter().filter_map(|&i| point(data, i)).filter(on) {
-        let first = first.get_or_insert(p);
-        n += T::ONE;
-        let d = [p[0] - first[0], p[1] - first[1], p[2] - first[2], p[3] - first[3]];
-        for k in 0..4 {
-            sum[k] += d[k];
-            square[k] += d[k] * d[k];
-        }
-        cross[0] += d[0] * d[1];
-        cross[1] += d[2] * d[3];
-    }
     let mut result = *line;
-    let Some(first) = first else { return result };
+    // One view after the other, which is half the code of both together.
     for view in 0..2 {
         let (x, y) = (2 * view, 2 * view + 1);
-        let (mx, my) = (sum[x] / n, sum[y] / n);
-        let (xx, yy, xy) = (square[x] / n - mx * mx, square[y] / n - my * my, cross[view] / n - mx * my);
+        // Moments about the first point.
+        let mut first = None;
+        let (mut n, mut sx, mut sy) = (T::ZERO, T::ZERO, T::ZERO);
+        let (mut xx, mut yy, mut xy) = (T::ZERO, T::ZERO, T::ZERO);
+        for p in inliers.iter().filter_map(|&i| point(data, i)).filter(|p| lies_on(p, line, limit)) {
+            let [p, q] = [p[x], p[y]];
+            let first: &[T; 2] = first.get_or_insert([p, q]);
+            let (dx, dy) = (p - first[0], q - first[1]);
+            n += T::ONE;
+            sx += dx;
+            sy += dy;
+            xx += dx * dx;
+            yy += dy * dy;
+            xy += dx * dy;
+        }
+        let Some(first) = first else { break };
+        let (mx, my) = (sx / n, sy / n);
+        let (xx, yy, xy) = (xx / n - mx * mx, yy / n - my * my, xy / n - mx * my);
         // The direction of the larger moment, from the half angle: (xx - yy + r, 2 xy) or (2 xy, yy - xx + r).
         let r = sqrt((xx - yy) * (xx - yy) + lit::<T>(4.0) * xy * xy);
         let (dx, dy) = if xx > yy { (xx - yy + r, T::TWO * xy) } else { (T::TWO * xy, yy - xx + r) };
         let length = sqrt(dx * dx + dy * dy);
         if length > T::ZERO {
-            result[0][x] = first[x] + mx;
-            result[0][y] = first[y] + my;
+            result[0][x] = first[0] + mx;
+            result[0][y] = first[1] + my;
             result[1][x] = -dy / length;
             result[1][y] = dx / length;
         }
@@ -177,7 +178,7 @@ fn off_line<T: Real, B: EpipolarBlock<T>>(
     let mut at = 0usize;
     for seen in 0..inliers.len() as u32 {
         let point = inliers.get(at).and_then(|&index| point(data, index));
-        let on = point.is_some_and(|p| distances_sq(&p, line).iter().all(|d| *d < limit));
+        let on = point.is_some_and(|p| lies_on(&p, line, limit));
         off += !on as u32;
         at += step;
         if at >= inliers.len() {
@@ -239,23 +240,24 @@ pub(super) fn few_distinct<T: Real, B: EpipolarBlock<T>>(
         }
     }
     let many = more > 0;
-    // A model through repeated points can be bent to meet some accidents: nine in ten are too many.
-    let mut falling = [0u32; DISTINCT];
-    for mut size in sizes {
-        for largest in &mut falling {
-            if size > *largest {
-                core::mem::swap(largest, &mut size);
+    // The largest first.
+    for i in 1..DISTINCT {
+        for j in 0..i {
+            if sizes[i] > sizes[j] {
+                sizes.swap(i, j);
             }
         }
     }
-    let held = |points: u32| -> u32 { falling.iter().take(points as usize).filter(|&&size| size > 1).sum() };
+    let held = |points: u32| -> u32 { sizes.iter().take(points as usize).filter(|&&size| size > 1).sum() };
+    // A model through repeated points can be bent to meet some accidents: nine in ten are too many.
     let most = total - total / 10;
     if total > 0 && held(minimal - 1) >= most {
         return true;
     }
     // One more fixes the model but for its several solutions: the rest must tell the right one.
     let wrong = (data.count as u32).saturating_sub(total);
-    let (held, rest) = (held(needed - 1), total - held(needed - 1));
+    let held = held(needed - 1);
+    let rest = total - held;
     if needed > minimal && held >= most && !beyond_chance(rest + wrong, rest, 0, accident()) {
         return true;
     }
@@ -267,17 +269,7 @@ pub(super) fn few_distinct<T: Real, B: EpipolarBlock<T>>(
     // Given the most repeated points, each of which takes the place of one of a minimal sample: do the rest agree more
     // often than chance?
     let mut rest = total;
-    for taken in 1..core::cmp::min(minimal, 8) {
-        let (mut largest, mut place) = (0, None);
-        for size in &mut sizes {
-            if *size > largest {
-                largest = *size;
-                place = Some(size);
-            }
-        }
-        if let Some(size) = place {
-            *size = 0;
-        }
+    for (taken, &largest) in (1..core::cmp::min(minimal, 8)).zip(&sizes) {
         rest = rest.saturating_sub(largest);
         let repeated = largest > 1 && 2 * rest <= total;
         if repeated && !beyond_chance(rest + wrong, rest, minimal - taken, accident()) {
