@@ -51,6 +51,7 @@ pub use workspace::{
 /// A stride near the golden ratio of `count` and coprime to it: steps of it visit every entry of a list once, and early
 /// ones are spread over the whole list, so that an order in the input (best match first) does not mislead an early
 /// exit.
+#[cfg_attr(small, inline(never))]
 pub(crate) fn stride(count: usize) -> usize {
     let first = count * 5 / 8;
     (first..first + 64).find(|&stride| gcd(stride, count) == 1).unwrap_or(1)

@@ -141,6 +141,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
     /// The rotation that explains the inliers of a pose best, by alternating between the closest rotation of all that are
     /// explained and the choice of those, on a few blocks and then on more; none where they leave one open, or where less
     /// than half of them turn.
+    #[cfg_attr(small, inline(never))]
     pub(super) fn rotation(&self, pose: &PoseModel<T>, sigma: T) -> Option<RotationModel<T>> {
         let few = self.agreeing(pose, TURNED_BLOCKS);
         let turned = self.nearest(&pose.rotation, &few, &TURN_SIGMAS, sigma)?;
@@ -308,6 +309,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
 
     /// Adds what is known of the rotation, weighed against the variance of a residual where that is less than the one
     /// assumed, lest it outweigh correspondences that are better than they are said to be.
+    #[cfg_attr(small, inline(never))]
     fn add_prior(&self, sums: &mut NormalEquations<T, 5>, model: &PoseModel<T>, variance: T) {
         if let Some((known, assumed)) = &self.prior {
             known.add(sums, &model.rotation, min(*assumed, variance));
