@@ -62,7 +62,7 @@ impl<T: Real, const N: usize> Ldlt<T, N> {
     /// `A^-1`, symmetric to the bit.
     ///
     /// # Cost
-    /// About N^3 / 2 multiplications.
+    /// 3 N^3 / 2 multiplications.
     #[must_use]
     pub fn inverse(&self) -> SMatrix<T, N, N> {
         let mut columns = [[T::ZERO; N]; N];
