@@ -145,15 +145,17 @@ fn factor<T: Real>(a: &[T], damping: T, lower: &mut [T], inverse_d: &mut [T]) ->
     for i in 0..n {
         // Row i of L D first (by forward substitution), of L after the division by D.
         let (above, row) = lower.split_at_mut_checked(i * n)?;
-        let row = row.get_mut(..i)?;
-        for (j, x) in row.iter_mut().enumerate() {
-            *x = *a.get(j * n + i)?;
+        for j in 0..i {
+            let mut sum = *a.get(j * n + i)?;
+            for (x, y) in row.iter().zip(above.get(j * n..)?).take(j) {
+                sum -= *x * *y;
+            }
+            *row.get_mut(j)? = sum;
         }
-        forward(above, n, row)?;
         let diagonal = *a.get(i * n + i)?;
         let diagonal = diagonal + damping * diagonal;
         let mut pivot = diagonal;
-        for (x, inverse) in row.iter_mut().zip(&*inverse_d) {
+        for (x, inverse) in row.iter_mut().zip(&*inverse_d).take(i) {
             let scaled = *x * *inverse;
             pivot -= scaled * *x;
             *x = scaled;
@@ -172,7 +174,7 @@ fn factor<T: Real>(a: &[T], damping: T, lower: &mut [T], inverse_d: &mut [T]) ->
 #[cfg_attr(not(small), inline(always))]
 fn substitute<T: Real>(lower: &[T], inverse_d: &[T], x: &mut [T]) -> Option<()> {
     let n = inverse_d.len();
-    forward(lower, n, x)?;
+    forward(lower, x)?;
     for i in (0..n).rev() {
         let (before, after) = x.split_at_mut_checked(i + 1)?;
         let target = before.last_mut()?;
@@ -184,11 +186,12 @@ fn substitute<T: Real>(lower: &[T], inverse_d: &[T], x: &mut [T]) -> Option<()> 
     Some(())
 }
 
-/// `x <- L^-1 x`, of an `L` whose rows begin `n` elements apart.
+/// `x <- L^-1 x`.
 #[cfg_attr(small, inline(never))]
 #[cfg_attr(not(small), inline(always))]
-fn forward<T: Real>(lower: &[T], n: usize, x: &mut [T]) -> Option<()> {
-    for i in 0..x.len() {
+fn forward<T: Real>(lower: &[T], x: &mut [T]) -> Option<()> {
+    let n = x.len();
+    for i in 0..n {
         let (before, rest) = x.split_at_mut_checked(i)?;
         let target = rest.first_mut()?;
         for (l, y) in lower.get(i * n..)?.iter().zip(before) {
@@ -206,7 +209,7 @@ fn invert<T: Real>(lower: &[T], inverse_d: &[T], columns: &mut [T], inverse: &mu
     for c in 0..n {
         let column = columns.get_mut(c * n..c * n + n)?;
         *column.get_mut(c)? = T::ONE;
-        forward(lower, n, column)?;
+        forward(lower, column)?;
     }
     for i in 0..n {
         for j in 0..=i {
