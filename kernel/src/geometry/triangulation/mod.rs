@@ -17,6 +17,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::Pose;
 use super::pose::{rotation_matrix, vector_angle};
 use crate::Real;
+use crate::linalg::times;
 use crate::linalg::vec3::{cross, dot, over};
 use crate::real::{abs, is_finite, lit, max, sqrt};
 
@@ -107,7 +108,7 @@ impl<T: Real> ViewPair<T> {
     #[inline]
     #[must_use]
     pub fn from_parts(r: &Matrix3<T>, t: &Vector3<T>) -> Self {
-        Self { rotation: *r, centre: -r.tr_mul(t) }
+        Self { rotation: *r, centre: -times(&r.transpose(), t) }
     }
 
     /// The centre of view 2 in the frame of view 1, `-R' t`.

@@ -110,28 +110,33 @@ fn subtract<T: Real>(row: &mut [T; 10], f: T, other: &Cubic<T>) {
 impl<T: Real> HiddenRow<T> {
     pub(super) const ZERO: Self = Self([T::ZERO; 13]);
 
-    /// The row in 1 / z.
-    pub(super) fn reversed(self) -> Self {
-        let [x0, x1, x2, x3, y0, y1, y2, y3, o0, o1, o2, o3, o4] = self.0;
-        Self([x3, x2, x1, x0, y3, y2, y1, y0, o4, o3, o2, o1, o0])
+    /// The polynomials of the row.
+    #[inline]
+    fn polynomials(&mut self) -> [&mut [T]; 3] {
+        let (cubics, quartic) = self.0.split_at_mut(8);
+        let (x, y) = cubics.split_at_mut(4);
+        [x, y, quartic]
     }
 
-    /// The row in z - s (Horner's scheme, repeated).
-    pub(super) fn shifted(self, s: T) -> Self {
-        let [x0, x1, x2, x3, y0, y1, y2, y3, o0, o1, o2, o3, o4] = self.0;
-        let (mut x, mut y, mut o) = ([x0, x1, x2, x3], [y0, y1, y2, y3], [o0, o1, o2, o3, o4]);
-        for level in 0..3 {
-            for i in (level..3).rev() {
-                x[i] += s * x[i + 1];
-                y[i] += s * y[i + 1];
+    /// Makes it the row in 1 / z.
+    pub(super) fn reverse(&mut self) {
+        for polynomial in self.polynomials() {
+            polynomial.reverse();
+        }
+    }
+
+    /// Makes it the row in z - s (Horner's scheme, repeated).
+    pub(super) fn shift(&mut self, s: T) {
+        for polynomial in self.polynomials() {
+            let Some((last, lower)) = polynomial.split_last_mut() else { continue };
+            for level in 0..lower.len() {
+                let mut above = *last;
+                for c in lower.iter_mut().skip(level).rev() {
+                    *c += s * above;
+                    above = *c;
+                }
             }
         }
-        for level in 0..4 {
-            for i in (level..4).rev() {
-                o[i] += s * o[i + 1];
-            }
-        }
-        Self([x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3], o[0], o[1], o[2], o[3], o[4]])
     }
 
     #[cfg_attr(not(small), inline(always))]

@@ -129,7 +129,10 @@ fn solve<T: Real, W: Real>(x1: &[Vector3<T>; 5], x2: &[Vector3<T>; 5], found: &m
     if centre.spread > lit(SPREAD) {
         let shift = narrow(centre.x);
         for row in &mut rows {
-            *row = if turned { row.reversed() } else { *row }.shifted(shift);
+            if turned {
+                row.reverse();
+            }
+            row.shift(shift);
         }
         let radius = min(lit::<W>(4.0) * centre.spread, W::ONE);
         found.add_roots(&rows, Chart::Disc { radius, shift, turned });
