@@ -6,10 +6,12 @@ use crate::real::{from_u32, lit};
 /// An odd constant near 2^64 / golden ratio: steps of it visit all 64-bit numbers evenly.
 const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// A bijection of 64-bit words in which every input bit reaches every output bit (the finaliser of SplitMix64).
+/// A word of the sequence of a key: a bijection of 64-bit words in which every input bit reaches every output bit
+/// (SplitMix64).
 #[cfg_attr(not(small), inline)]
 #[cfg_attr(small, inline(never))]
-const fn mix(mut z: u64) -> u64 {
+const fn mix(key: u64, number: u32) -> u64 {
+    let mut z = key.wrapping_add((number as u64).wrapping_mul(STEP));
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ (z >> 31)
@@ -56,7 +58,7 @@ impl<T: Real> Sampler<T> {
     /// Samples of `count` correspondences, all alike.
     #[must_use]
     pub fn uniform(seed: u64, count: u32) -> Self {
-        let seed = mix(seed.wrapping_add(STEP));
+        let seed = mix(seed, 1);
         Self { seed: [seed as u32, (seed >> 32) as u32], count, growth: None }
     }
 
@@ -118,7 +120,7 @@ impl<T: Real> Sampler<T> {
             }
         }
         let seed = (self.seed[1] as u64) << 32 | self.seed[0] as u64;
-        choose(mix(seed.wrapping_add((iteration as u64).wrapping_mul(STEP))), pool, newest, chosen);
+        choose(mix(seed, iteration), pool, newest, chosen);
         true
     }
 }
@@ -141,8 +143,8 @@ impl<T: Real> Growth<T> {
 #[cfg_attr(small, inline(never))]
 fn choose(key: u64, pool: u32, newest: Option<u32>, chosen: &mut [u32]) {
     let draws = chosen.len() - newest.is_some() as usize;
-    for (k, step) in (0..draws as u32).zip(1u64..) {
-        let word = mix(key.wrapping_add(step.wrapping_mul(STEP)));
+    for k in 0..draws as u32 {
+        let word = mix(key, k + 1);
         // A number among those not chosen yet: walk up past the chosen ones, which are in rising order.
         let mut value = (((word >> 32) * (pool - k) as u64) >> 32) as u32;
         for &taken in chosen.iter().take(k as usize) {
