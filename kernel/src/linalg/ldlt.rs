@@ -75,16 +75,18 @@ impl<T: Real, const N: usize> Ldlt<T, N> {
 
 // The work is done on slices, by functions that small code holds once for every N. Where N is known, no check is left.
 
+/// The largest matrix there is room for: one function serves all.
+const LARGEST: usize = 8;
+
 /// The step `x = -A^-1 g` of a damped hessian, and by how much it promises to lower the cost; none where a direction is open.
 pub(crate) fn damped_step<T: Real, const N: usize>(
     a: &SMatrix<T, N, N>,
     g: &SVector<T, N>,
     damping: T,
 ) -> Option<(SVector<T, N>, T)> {
-    let (mut lower, mut inverse_d, mut x) = ([[T::ZERO; N]; N], [T::ZERO; N], *g);
-    let a = a.data.0.as_flattened();
-    let promise =
-        descend(a, &g.data.0[0], damping, lower.as_flattened_mut(), &mut inverse_d, &mut x.data.0[0])?;
+    const { assert!(N <= LARGEST) };
+    let mut x = *g;
+    let promise = descend(a.data.0.as_flattened(), &g.data.0[0], damping, &mut x.data.0[0])?;
     Some((x, promise))
 }
 
@@ -93,40 +95,31 @@ pub(crate) fn scaled_inverse<T: Real, const N: usize>(
     a: &SMatrix<T, N, N>,
     scale: T,
 ) -> Option<SMatrix<T, N, N>> {
-    let (mut lower, mut columns, mut inverse_d) = ([[T::ZERO; N]; N], [[T::ZERO; N]; N], [T::ZERO; N]);
+    const { assert!(N <= LARGEST) };
     let mut inverse = *a;
-    let (lower, columns) = (lower.as_flattened_mut(), columns.as_flattened_mut());
-    scale_inverse(inverse.data.0.as_flattened_mut(), scale, lower, &mut inverse_d, columns)?;
+    scale_inverse(inverse.data.0.as_flattened_mut(), N, scale)?;
     Some(inverse)
 }
 
 #[cfg_attr(small, inline(never))]
 #[cfg_attr(not(small), inline(always))]
-fn scale_inverse<T: Real>(
-    a: &mut [T],
-    scale: T,
-    lower: &mut [T],
-    inverse_d: &mut [T],
-    columns: &mut [T],
-) -> Option<()> {
-    factor(a, T::ZERO, lower, inverse_d)?;
-    invert(lower, inverse_d, columns, a)?;
+fn scale_inverse<T: Real>(a: &mut [T], n: usize, scale: T) -> Option<()> {
+    let (mut lower, mut columns, mut inverse_d) =
+        ([T::ZERO; LARGEST * LARGEST], [T::ZERO; LARGEST * LARGEST], [T::ZERO; LARGEST]);
+    let inverse_d = inverse_d.get_mut(..n)?;
+    factor(a, T::ZERO, &mut lower, inverse_d)?;
+    invert(&lower, inverse_d, &mut columns, a)?;
     a.iter_mut().for_each(|x| *x *= scale);
     Some(())
 }
 
 #[cfg_attr(small, inline(never))]
 #[cfg_attr(not(small), inline(always))]
-fn descend<T: Real>(
-    a: &[T],
-    g: &[T],
-    damping: T,
-    lower: &mut [T],
-    inverse_d: &mut [T],
-    x: &mut [T],
-) -> Option<T> {
-    factor(a, damping, lower, inverse_d)?;
-    substitute(lower, inverse_d, x)?;
+fn descend<T: Real>(a: &[T], g: &[T], damping: T, x: &mut [T]) -> Option<T> {
+    let (mut lower, mut inverse_d) = ([T::ZERO; LARGEST * LARGEST], [T::ZERO; LARGEST]);
+    let inverse_d = inverse_d.get_mut(..x.len())?;
+    factor(a, damping, &mut lower, inverse_d)?;
+    substitute(&lower, inverse_d, x)?;
     let mut promise = T::ZERO;
     for (x, g) in x.iter_mut().zip(g) {
         promise += *x * *g;

@@ -68,8 +68,7 @@ impl<T: Real, const P: usize> NormalEquations<T, P> {
     }
 
     /// The step to the minimum, each diagonal element larger by the share `damping`, and by how much it promises to lower
-    /// the cost; none where a direction is open. Called where code is to be small: its factors take no stack during a pass.
-    #[cfg_attr(small, inline(never))]
+    /// the cost; none where a direction is open.
     pub(crate) fn step(&self, damping: T) -> Option<(SVector<T, P>, T)> {
         damped_step(&self.hessian, &self.gradient, damping)
     }

@@ -16,13 +16,7 @@ pub(super) fn covariance<T: Real, const P: usize>(
     sums: &NormalEquations<T, P>,
     variance: T,
 ) -> Option<SMatrix<T, P, P>> {
-    inverse(&sums.hessian, variance)
-}
-
-/// `variance A^-1`; none where A is singular.
-#[cfg_attr(small, inline(never))]
-fn inverse<T: Real, const P: usize>(a: &SMatrix<T, P, P>, variance: T) -> Option<SMatrix<T, P, P>> {
-    scaled_inverse(a, variance)
+    scaled_inverse(&sums.hessian, variance)
 }
 
 /// Sums over residuals within the support of Tukey's loss: of `r psi`, of `psi^2` and of `psi'`, in units of the support.
@@ -178,5 +172,5 @@ pub(super) fn planar_covariance<T: Real>(
             }
         }
     }
-    inverse(&information, variance)
+    scaled_inverse(&information, variance)
 }

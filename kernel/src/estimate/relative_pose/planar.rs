@@ -10,7 +10,7 @@ use super::verdict::{PlanarPose, RelativePoseEstimate, RelativePoseVerdict};
 use crate::geometry::pose::rotation_matrix;
 use crate::geometry::{Homography, Pose};
 use crate::linalg::vec3::{cross, dot};
-use crate::linalg::{LANES, Ldlt, add_outer, times};
+use crate::linalg::{LANES, add_outer, damped_step, times};
 use crate::real::{from_u32, is_finite, lit, max, sqrt};
 use crate::refine::blocks::EpipolarBlock;
 use crate::refine::homography::{HomographyModel, transfer_equations, transfer_sq};
@@ -151,13 +151,13 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         // All that are near a plane of three give a good one.
         let coarse = best.1?;
         let mut moment = Matrix3::zeros();
-        let mut right = Vector3::zeros();
+        let mut gradient = Vector3::zeros();
         for entry in entries.iter().filter(|entry| entry.squared(&coarse) < limit * T::TWO) {
             let ray = Vector3::from(entry.ray);
             add_outer(&mut moment, &ray, &ray, entry.weight);
-            right += ray * (entry.value * entry.weight);
+            gradient -= ray * (entry.value * entry.weight);
         }
-        let plane = Ldlt::new(&moment)?.solve(&right);
+        let (plane, _) = damped_step(&moment, &gradient, T::ZERO)?;
         let held = entries.iter().filter(|entry| entry.squared(&plane) < limit * T::TWO).count();
         if held * HELD[1] < used * HELD[0] {
             return None;
