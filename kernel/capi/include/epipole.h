@@ -289,7 +289,7 @@ enum epi_relative_pose_verdict
     EPI_RELATIVE_POSE_VERDICT_NO_MOTION = 3,
     // The inliers agree, and no pose follows: see `unobservable`.
     EPI_RELATIVE_POSE_VERDICT_UNOBSERVABLE = 4,
-    // Something agrees, on no more correspondences than chance explains.
+    // So few correspondences that chance could explain them.
     EPI_RELATIVE_POSE_VERDICT_TOO_FEW_INLIERS = 5,
     // No model explains more correspondences than chance.
     EPI_RELATIVE_POSE_VERDICT_NO_CONSENSUS = 6,
@@ -393,7 +393,7 @@ enum epi_homography_verdict
     EPI_HOMOGRAPHY_VERDICT_FOUND = 0,
     // The inliers agree, and many homographies explain them: see `unobservable`.
     EPI_HOMOGRAPHY_VERDICT_UNOBSERVABLE = 1,
-    // Something agrees, on no more correspondences than chance explains.
+    // So few correspondences that chance could explain them.
     EPI_HOMOGRAPHY_VERDICT_TOO_FEW_INLIERS = 2,
     // No homography explains more correspondences than chance.
     EPI_HOMOGRAPHY_VERDICT_NO_CONSENSUS = 3,

@@ -56,7 +56,7 @@ pub enum RelativePoseVerdict {
     NoMotion = 3,
     /// The inliers agree, and no pose follows: see `unobservable`.
     Unobservable = 4,
-    /// Something agrees, on no more correspondences than chance explains.
+    /// So few correspondences that chance could explain them.
     TooFewInliers = 5,
     /// No model explains more correspondences than chance.
     NoConsensus = 6,
@@ -124,7 +124,7 @@ pub enum HomographyVerdict {
     Found = 0,
     /// The inliers agree, and many homographies explain them: see `unobservable`.
     Unobservable = 1,
-    /// Something agrees, on no more correspondences than chance explains.
+    /// So few correspondences that chance could explain them.
     TooFewInliers = 2,
     /// No homography explains more correspondences than chance.
     NoConsensus = 3,

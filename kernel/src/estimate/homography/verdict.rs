@@ -15,7 +15,7 @@ pub enum HomographyVerdict<T: Real> {
     Found(FoundHomography<T>),
     /// The inliers agree, but many homographies explain them.
     Unobservable(Unobservable),
-    /// Something agrees, on fewer correspondences than chance could explain.
+    /// So few correspondences that chance could explain them even if all agreed.
     TooFewInliers,
     /// No homography explains more correspondences than chance.
     NoConsensus,

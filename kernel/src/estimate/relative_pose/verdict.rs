@@ -26,7 +26,7 @@ pub enum RelativePoseVerdict<T: Real> {
     NoMotion,
     /// The inliers agree, but no pose follows from them.
     Unobservable(Unobservable),
-    /// Something agrees, on fewer correspondences than chance could explain.
+    /// So few correspondences that chance could explain them even if all agreed.
     TooFewInliers,
     /// No model explains more correspondences than chance.
     NoConsensus,
