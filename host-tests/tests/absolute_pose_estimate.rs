@@ -2,7 +2,7 @@
 
 use epipole::estimate::{
     AbsolutePoseError, AbsolutePoseEstimate, AbsolutePoseOptions, AbsolutePoseStorage, AbsolutePoseVerdict,
-    GravityPrior, PriorFit, Unobservable, WideAbsolutePoseStorage, absolute_pose, absolute_pose_guided,
+    GravityPrior, PriorFit, WideAbsolutePoseStorage, absolute_pose, absolute_pose_guided,
 };
 use epipole::geometry::pose::log;
 use epipole::geometry::{CameraModel, KannalaBrandt, Pinhole, Pose};
@@ -58,44 +58,6 @@ in_both_scalars! {
         }
     }
 
-    fn verdicts<T>() {
-        for_each_case(30, |seed, rng| {
-            let verdict = |p: &AbsoluteScene| run::<T>(&p.pixels(), &p.points(), &options(2.0)).verdict;
-            let line = verdict(&problem(Shape::Line, 0.5, 0.0, seed));
-            assert!(matches!(line, AbsolutePoseVerdict::Unobservable(Unobservable::Collinear) | AbsolutePoseVerdict::NoConsensus), "{line:?}");
-            let three = verdict(&problem(Shape::Repeated(3), 0.5, 0.0, seed));
-            assert!(matches!(three, AbsolutePoseVerdict::Unobservable(Unobservable::TooFewDistinct)), "{three:?}");
-            let none = verdict(&problem(Shape::Volume, 0.5, 1.0, seed));
-            assert!(matches!(none, AbsolutePoseVerdict::NoConsensus | AbsolutePoseVerdict::TooFewInliers), "{none:?}");
-            // All axes of the world point the wrong way: what was in front is behind.
-            let p = problem(Shape::Volume, 0.5, 0.2, seed);
-            let flipped: Vec<Vector3<T>> = p.points::<T>().iter().map(|x| -x).collect();
-            let behind = run::<T>(&p.pixels(), &flipped, &options(2.0)).verdict;
-            assert!(matches!(behind, AbsolutePoseVerdict::BehindCamera), "{behind:?}");
-            // A small plane far away.
-            let truth = Pose::new(Vector3::new(0.1, 0.2, 12.0), Vector3::new(0.5, 0.3 * rng.unit(), 0.0));
-            let flat: Vec<Vector3<f64>> = (0..N)
-                .map(|_| Vector3::new(rng.range(-0.3, 0.3), rng.range(-0.3, 0.3), 0.0))
-                .collect();
-            let pixels: Vec<Vector2<T>> = flat
-                .iter()
-                .map(|x| {
-                    let pixel = camera::<f64>().project(&(truth * Point3::from(*x)).coords).expect("in front");
-                    (pixel + Vector2::new(rng.normal(), rng.normal())).map(lit)
-                })
-                .collect();
-            let flat: Vec<Vector3<T>> = flat.iter().map(|x| x.map(lit)).collect();
-            let estimate = run::<T>(&pixels, &flat, &options(3.0));
-            let poses: Vec<Pose<T>> = match &estimate.verdict {
-                AbsolutePoseVerdict::PlanarAmbiguity(poses) => poses.iter().map(|p| p.pose).collect(),
-                AbsolutePoseVerdict::Pose(found) => vec![found.pose],
-                other => panic!("{other:?}"),
-            };
-            let error = poses.iter().map(|p| rotation_error(&p.rotation, &truth.rotation)).fold(9.0, f64::min);
-            assert!(error < 0.2, "{error} of {}", poses.len());
-        });
-    }
-
     fn a_gravity_prior_helps_or_is_left_aside<T>() {
         let mut iterations = [0u32; 2];
         for_each_case(30, |seed, rng| {
@@ -148,21 +110,6 @@ in_both_scalars! {
         });
         assert!(aided < 1.1 * plain, "{aided:e} {plain:e}");
         assert!(aided < 1.5 * predicted, "{aided:e} {predicted:e}");
-    }
-
-    /// A pose that takes one cluster of points to one of pixels has inliers by chance: of such scenes one in four had a pose
-    /// where chance was the area of a disc.
-    fn clusters_matched_wrongly_have_no_pose<T>() {
-        share_of(30, |seed, rng| {
-            let clusters: Vec<_> = (0..6).map(|_| (Vector2::new(rng.range(0.0, 640.0), rng.range(0.0, 480.0)), rng.normal3() * 4.0)).collect();
-            let pixels: Vec<Vector2<T>> = (0..N)
-                .map(|_| (clusters[rng.index(6)].0 + Vector2::new(rng.normal(), rng.normal()) * 25.0).map(lit))
-                .collect();
-            let points: Vec<Vector3<T>> = (0..N).map(|_| (clusters[rng.index(6)].1 + rng.normal3() * 0.3).map(lit)).collect();
-            let mut options = options::<T>(4.0);
-            options.ransac.seed = seed;
-            run(&pixels, &points, &options).pose().is_none()
-        }).assert_at_least(0.96);
     }
 
     /// What is believed is not asked for more: eight of ten, and six without a wrong one among them.

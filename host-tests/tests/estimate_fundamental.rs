@@ -1,8 +1,8 @@
 //! Robust fundamental matrix: the truth under outliers, dominant planes, verdicts, errors, repeated bits.
 
 use epipole::estimate::{
-    FundamentalEstimate, FundamentalOptions, FundamentalStorage, FundamentalVerdict, Unobservable,
-    fundamental, fundamental_guided,
+    FundamentalEstimate, FundamentalOptions, FundamentalStorage, FundamentalVerdict, fundamental,
+    fundamental_guided,
 };
 use epipole::nalgebra::{Matrix3, Vector2};
 use epipole::real::lit;
@@ -131,32 +131,6 @@ in_both_scalars! {
             let (x1, x2) = scene.pixels::<T>();
             run(&x1, &x2, &options(1.5)).fundamental().is_some_and(|f| distance(&f.0, &scene) < 1.5)
         }).assert_at_least(0.9);
-    }
-
-    fn verdicts_on_degenerate_points<T>() {
-        let verdict = |shape: Shape, seed: u64| {
-            let scene = Scene::new(Motion::General, N).shape(shape).noise_px(0.5).outliers(0.3);
-            let (x1, x2) = scene.generate(seed).pixels::<T>();
-            run(&x1, &x2, &options(1.5)).verdict
-        };
-        // A line seen along itself is but a few points.
-        share_of(30, |seed, _| match verdict(Shape::Line, seed) {
-            FundamentalVerdict::Unobservable(why) => why == Unobservable::Collinear,
-            other => panic!("{other:?}"),
-        }).assert_at_least(0.8);
-        for distinct in [1, 2, 3, 5, 7] {
-            let few = FundamentalVerdict::Unobservable(Unobservable::TooFewDistinct);
-            share_of(30, |seed, _| match verdict(Shape::Repeated(distinct), seed) {
-                FundamentalVerdict::Found(_) => panic!("{distinct} points have no fundamental matrix"),
-                other => other == few,
-            }).assert_at_least(0.9);
-        }
-        for_each_case(5, |seed, _| {
-            let (x1, x2) = scene(Motion::General, 0.5, 1.0, seed).pixels::<T>();
-            let estimate = run(&x1, &x2, &options(1.5));
-            assert_eq!(estimate.verdict, FundamentalVerdict::NoConsensus);
-            assert_eq!(estimate.report.inliers, 0);
-        });
     }
 
     fn few_correspondences_prove_nothing<T>() {
