@@ -7,8 +7,8 @@ use super::lm::{EpipolarModel, Manifold, NormalEquations, Row};
 use crate::Real;
 use crate::geometry::Pose;
 use crate::geometry::pose::{from_parts, tangent_basis};
-use crate::linalg::product;
-use crate::linalg::vec3::{cross, dot, scaled};
+use crate::linalg::vec3::{dot, scaled};
+use crate::linalg::{cross, product};
 use crate::real::sqrt;
 
 /// A rotation, a unit translation, and the scales between normalised coordinates and the blocks' coordinates.
@@ -121,12 +121,7 @@ impl<T: Real> PoseModel<T> {
     /// `E = [t]x R`, column by column.
     #[inline]
     fn essential(&self) -> Matrix3<T> {
-        let mut e = self.rotation;
-        let t = &self.translation.data.0[0];
-        for column in &mut e.data.0 {
-            *column = cross(t, column);
-        }
-        e
+        cross(&self.translation, &self.rotation)
     }
 }
 

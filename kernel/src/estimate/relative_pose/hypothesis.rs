@@ -6,7 +6,7 @@ use crate::Real;
 use crate::geometry::Essential;
 use crate::geometry::pose::nearest_rotation;
 use crate::linalg::vec3::{cross, dot};
-use crate::linalg::{LANES, Lanes, add_outer, times};
+use crate::linalg::{self, LANES, Lanes, add_outer, times};
 use crate::real::{abs, from_u32, lit, min, sqrt};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock};
 use crate::refine::homography::{RotationModel, transfer_sq};
@@ -446,11 +446,10 @@ fn pose_in_front<T: Real>(
         return None;
     }
     let scale = T::ONE / sqrt(longest);
-    let t = [t[0] * scale, t[1] * scale, t[2] * scale];
+    let t = Vector3::new(t[0] * scale, t[1] * scale, t[2] * scale);
     // With |t| = 1 and E scaled to |E|^2 = 2: R = cof(E) - [t]x E, or with -t.
     let scale = T::ONE / sqrt(size);
-    let turned = e.map(|column| cross(&t, &column));
-    let t = Vector3::from(t);
+    let turned = linalg::cross(&t, &essential.0).data.0;
     for side in [-scale, scale] {
         let mut rotation = essential.0;
         for j in 0..3 {

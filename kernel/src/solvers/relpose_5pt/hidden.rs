@@ -111,7 +111,7 @@ impl<T: Real> HiddenRow<T> {
     pub(super) const ZERO: Self = Self([T::ZERO; 13]);
 
     /// The polynomials of the row.
-    #[inline]
+    #[inline(always)]
     fn polynomials(&mut self) -> [&mut [T]; 3] {
         let (cubics, quartic) = self.0.split_at_mut(8);
         let (x, y) = cubics.split_at_mut(4);
@@ -120,23 +120,18 @@ impl<T: Real> HiddenRow<T> {
 
     /// Makes it the row in 1 / z.
     pub(super) fn reverse(&mut self) {
-        for polynomial in self.polynomials() {
-            polynomial.reverse();
-        }
+        let [x, y, one] = self.polynomials();
+        x.reverse();
+        y.reverse();
+        one.reverse();
     }
 
-    /// Makes it the row in z - s (Horner's scheme, repeated).
+    /// Makes it the row in z - s.
     pub(super) fn shift(&mut self, s: T) {
-        for polynomial in self.polynomials() {
-            let Some((last, lower)) = polynomial.split_last_mut() else { continue };
-            for level in 0..lower.len() {
-                let mut above = *last;
-                for c in lower.iter_mut().skip(level).rev() {
-                    *c += s * above;
-                    above = *c;
-                }
-            }
-        }
+        let [x, y, one] = self.polynomials();
+        shift(x, s);
+        shift(y, s);
+        shift(one, s);
     }
 
     #[cfg_attr(not(small), inline(always))]
@@ -163,6 +158,20 @@ impl<T: Real> HiddenRow<T> {
     fn scale(&mut self, f: T) {
         for i in 0..13 {
             self.0[i] *= f;
+        }
+    }
+}
+
+/// Makes a polynomial that in z - s (Horner's scheme, repeated).
+#[cfg_attr(not(small), inline(always))]
+#[cfg_attr(small, inline(never))]
+fn shift<T: Real>(polynomial: &mut [T], s: T) {
+    let Some((last, lower)) = polynomial.split_last_mut() else { return };
+    for level in 0..lower.len() {
+        let mut above = *last;
+        for c in lower.iter_mut().skip(level).rev() {
+            *c += s * above;
+            above = *c;
         }
     }
 }
