@@ -551,3 +551,30 @@ fn a_tremble_is_no_motion() {
         assert!(!matches!(verdict(0.0), RelativePoseVerdict::NoMotion));
     });
 }
+
+/// Most wrong matches that agree with the pose by accident are left out, for they seem to lie nearer than the scene; hardly
+/// any right ones are.
+#[test]
+fn accidental_inliers_are_left_out() {
+    let camera = scene_camera();
+    let mut options = options();
+    options.max_error_px = 2.0;
+    for motion in [Motion::General, Motion::Forward] {
+        let [mut wrong, mut right] = [0; 2];
+        for_each_case(20, |seed, _| {
+            let problem = Scene::new(motion, 1000).noise_px(1.0).outliers(0.7).generate(seed);
+            let (x1, x2) = problem.pixels::<f64>();
+            let mut memory = Memory::new(1000);
+            let mut workspace = memory.workspace();
+            refine_relative_pose(&camera, &camera, &x1, &x2, &problem.pose, &options, &mut workspace)
+                .unwrap()
+                .unwrap();
+            for (&kept, &inlier) in workspace.inliers().iter().zip(&problem.inlier) {
+                right += (kept && inlier) as u32;
+                wrong += (kept && !inlier) as u32;
+            }
+        });
+        println!("{motion:?}: of 6,000 right ones {right} kept, of 14,000 wrong ones {wrong}");
+        assert!(right > 5600 && wrong < 40, "{motion:?}: {right} {wrong}");
+    }
+}

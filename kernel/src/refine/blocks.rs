@@ -155,6 +155,23 @@ impl<T: Real> Sight<T> {
         let (aa, bb, ab) = (yy + y2 * y2, xx + x2 * x2, xy + x2 * y2);
         aa * bb - ab * ab <= parallel_sq * aa * bb && ab > T::ZERO
     }
+
+    /// The squared distance of the point from view 1 in baselines, top and bottom of a fraction: by the law of sines
+    /// `sin^2(e3, x) / sin^2(y, x)`.
+    #[inline(always)]
+    pub(crate) fn distance_sq(&self) -> [T; 2] {
+        let ([y0, y1, y2], [x0, x1, x2]) = (self.y, self.x);
+        let (a, b) = (y1 * x2 - y2 * x1, y2 * x0 - y0 * x2);
+        let yy = y0 * y0 + y1 * y1 + y2 * y2;
+        [(x0 * x0 + x1 * x1) * yy, a * a + b * b + self.c * self.c]
+    }
+
+    /// Whether the point is as far from view 1 as the root of so many squared baselines.
+    #[inline(always)]
+    pub(crate) fn beyond(&self, nearest_sq: T) -> bool {
+        let [top, bottom] = self.distance_sq();
+        top >= nearest_sq * bottom
+    }
 }
 
 /// A correspondence in a [`Frame`], and how its residual moves.

@@ -416,7 +416,7 @@ mod tests {
         PoseModel {
             rotation: crate::refine::relative_pose::cayley(&Vector3::new(0.1, -0.2, 0.05)),
             translation: Vector3::new(0.3, -0.5, 0.8).normalize(),
-            scales: Scales { view1: [0.9, 1.1], view2: [1.05, 0.95], parallel_sq: 10.0 },
+            scales: Scales { view1: [0.9, 1.1], view2: [1.05, 0.95], parallel_sq: 10.0, nearest_sq: 0.0 },
         }
     }
 

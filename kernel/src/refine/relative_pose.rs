@@ -32,13 +32,15 @@ pub(crate) struct Scales<T> {
     pub(crate) view2: [T; 2],
     /// Squared sine of the angle up to which rays count as parallel, so that their depths say nothing.
     pub(crate) parallel_sq: T,
+    /// Squared distance from view 1, in baselines, of the nearest points that take part; zero where all do.
+    pub(crate) nearest_sq: T,
 }
 
 impl<T: Real> Scales<T> {
     /// No scaling.
     #[must_use]
     pub(crate) fn unit() -> Self {
-        Self { view1: [T::ONE; 2], view2: [T::ONE; 2], parallel_sq: T::ZERO }
+        Self { view1: [T::ONE; 2], view2: [T::ONE; 2], parallel_sq: T::ZERO, nearest_sq: T::ZERO }
     }
 
     /// `D2^-1 E D1^-1` with `D = diag(scales, 1)`.
@@ -131,6 +133,16 @@ pub(crate) struct PoseFrame<T: Real> {
     pub(crate) views: Frame<T>,
     /// As in [`Scales`].
     pub(crate) parallel_sq: T,
+    /// As in [`Scales`].
+    pub(crate) nearest_sq: T,
+}
+
+impl<T: Real> PoseFrame<T> {
+    /// Whether a right match may be where the rays meet: in front of both cameras, and not too near.
+    #[inline(always)]
+    pub(crate) fn admits(&self, sight: &Sight<T>) -> bool {
+        sight.in_front(self.parallel_sq) && (self.nearest_sq == T::ZERO || sight.beyond(self.nearest_sq))
+    }
 }
 
 impl<T: Real> Manifold<T, 5> for PoseModel<T> {
@@ -170,13 +182,14 @@ impl<T: Real> EpipolarModel<T, 5> for PoseModel<T> {
                 view2.data.0[i][k] *= s2[k];
             }
         }
-        PoseFrame { axes, views: Frame { view1, view2 }, parallel_sq: self.scales.parallel_sq }
+        let Scales { parallel_sq, nearest_sq, .. } = self.scales;
+        PoseFrame { axes, views: Frame { view1, view2 }, parallel_sq, nearest_sq }
     }
 
     #[inline(always)]
     fn inside<B: EpipolarBlock<T>>(frame: &PoseFrame<T>, block: &B, l: usize, limit: T) -> bool {
         let sight = block.sight(&frame.views, l);
-        sight.c * sight.c < limit * sight.d && sight.in_front(frame.parallel_sq)
+        sight.c * sight.c < limit * sight.d && frame.admits(&sight)
     }
 
     /// By a rotation of the frame, and by the translation along its first two axes:

@@ -91,7 +91,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         for l in 0..LANES {
             let sight = block.sight(&view.frame.views, l);
             squared[l] = sight.c * sight.c * view.scale / sight.d;
-            if squared[l] < T::ONE && !sight.in_front(view.frame.parallel_sq) {
+            if squared[l] < T::ONE && !view.frame.admits(&sight) {
                 squared[l] = T::MAX;
             }
         }
@@ -117,25 +117,38 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
     /// themselves with view 2 of another in place of their own, of so many `others`; never below `least`.
     pub(super) fn accident(&self, model: &PoseModel<T>, least: T, others: usize) -> T {
         let view = self.view(model);
-        let blocks = self.data.blocks;
-        let full = blocks.get(..self.data.count / LANES).unwrap_or(blocks);
-        let (mut hits, mut seen) = (0u32, 0u32);
+        let mut hits = 0u32;
+        let seen = self.for_each_mispaired(others, &mut |block| {
+            for s in self.squared(block, &view) {
+                hits += (s < T::ONE) as u32;
+            }
+        });
+        let share = from_u32::<T>(hits + 2) / from_u32(seen + 2);
+        if seen > 0 && share > least { share } else { least }
+    }
+
+    /// The blocks of which every lane counts.
+    pub(super) fn whole_blocks(&self) -> &[B] {
+        self.data.blocks.get(..self.data.count / LANES).unwrap_or(self.data.blocks)
+    }
+
+    /// Calls `each` with some whole blocks, with view 2 of each of so many `others` in place of their own; how many
+    /// correspondences these are. One copy of it in the code, for it is called through a pointer.
+    pub(super) fn for_each_mispaired(&self, others: usize, each: &mut dyn FnMut(&B)) -> u32 {
+        let full = self.whole_blocks();
         let every = core::cmp::max(full.len() / SAMPLED_BLOCKS, 1);
         let others = core::cmp::min(others, full.len().saturating_sub(1));
+        let mut seen = 0;
         for k in 1..=others {
             // Blocks of the list and of the list turned by `shift`, which is never a whole turn.
             let shift = k * full.len() / (others + 1);
             let (start, end) = full.split_at_checked(shift).unwrap_or((full, &[]));
             for (block, other) in full.iter().zip(end.iter().chain(start)).step_by(every) {
-                let squared = self.squared(&block.mispaired(other), &view);
-                for s in squared {
-                    hits += (s < T::ONE) as u32;
-                }
+                each(&block.mispaired(other));
                 seen += LANES as u32;
             }
         }
-        let share = from_u32::<T>(hits + 2) / from_u32(seen + 2);
-        if seen > 0 && share > least { share } else { least }
+        seen
     }
 
     /// The rotation that explains the inliers of a pose best, by alternating between the closest rotation of all that are
@@ -242,8 +255,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         sample.iter().all(|&index| {
             self.data.blocks.get(index as usize / LANES).is_some_and(|block| {
                 let sight = block.sight(&frame.views, index as usize % LANES);
-                sight.c * sight.c < self.threshold * self.threshold * sight.d
-                    && sight.in_front(frame.parallel_sq)
+                sight.c * sight.c < self.threshold * self.threshold * sight.d && frame.admits(&sight)
             })
         })
     }

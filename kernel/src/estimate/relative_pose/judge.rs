@@ -77,6 +77,8 @@ const SUPPORT_SIGMAS: [f64; 2] = [3.5, 6.0];
 const FEW: u32 = 150;
 /// The least and largest such place, in thresholds.
 const SUPPORT: [f64; 2] = [0.8, 2.6];
+/// Of so few accidents expected a refinement takes no notice.
+const FEW_ACCIDENTS: f64 = 0.4;
 /// Passes of the last refinement at the most.
 const REFINE_PASSES: u32 = 10;
 /// Passes of a twin's.
@@ -353,11 +355,22 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         let seen = self.spread(model);
         let support = self.support(&seen);
         let variance = seen.noise * seen.noise;
+        let mut start = self.open(model);
+        // Not where hardly one is expected, and not of poses that are only tried.
+        let wrong = from_u32::<T>((self.problem.data.count as u32).saturating_sub(seen.count));
+        if passes > TWIN_PASSES && wrong * self.accident() > lit(FEW_ACCIDENTS) {
+            start.scales.nearest_sq = self.problem.nearest_sq(&start, support);
+        }
         // The last step is worth three hundredths of a correspondence.
         let tolerance = max(lit::<T>(3e-2) / from_u32(self.problem.data.count as u32), lit(1e-5));
         let Minimum { model, equations, .. } =
-            self.problem.optimise(model, &Loss::Tukey(support), passes, tolerance, variance);
+            self.problem.optimise(&start, &Loss::Tukey(support), passes, tolerance, variance);
         Refined { model, equations, support, variance }
+    }
+
+    /// A pose that points may be as near as they like to.
+    fn open(&self, model: &PoseModel<T>) -> PoseModel<T> {
+        PoseModel { scales: self.problem.scales, ..*model }
     }
 
     /// A pose refined from a caller's; none where too few agree with it to fix it. Writes the inlier mask.
@@ -403,7 +416,8 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     }
 
     pub(super) fn cost(&self, model: &PoseModel<T>) -> T {
-        let score = self.problem.score(model, &Gate::open(), &mut ScoreCounts::default());
+        // Of every pose over the same correspondences.
+        let score = self.problem.score(&self.open(model), &Gate::open(), &mut ScoreCounts::default());
         let prior = self.problem.prior.as_ref().map_or(T::ZERO, |(known, variance)| {
             known.cost(&model.rotation) * *variance / (self.problem.threshold * self.problem.threshold)
         });
