@@ -139,10 +139,23 @@ fn order_is_used<T: Real>() {
     });
 }
 
-/// Lines that are told apart, or not.
+/// Lines that are told apart, or not; that count as explaining the same points, or not.
 struct Lines<T> {
     line: Line<T>,
     told_apart: bool,
+    shared: bool,
+}
+
+impl<T: Real> Lines<T> {
+    /// Two lines of which one has a point more, and so many points on neither.
+    fn new(rng: &mut Rng, wrong: usize) -> Self {
+        let mut line = Line::<T>::new(rng, 31, wrong);
+        line.points.extend((0..30).map(|_| {
+            let x = rng.range(-5.0, 5.0);
+            (lit(x), lit(-0.5 * x - 1.0 + 0.01 * rng.normal()))
+        }));
+        Self { line, told_apart: false, shared: false }
+    }
 }
 
 impl<T: Real> Estimator<T, 2> for Lines<T> {
@@ -169,18 +182,18 @@ impl<T: Real> Estimator<T, 2> for Lines<T> {
     fn differs(&self, a: &(T, T), b: &(T, T)) -> bool {
         self.told_apart && (a.0 - b.0).to_f64().abs() > 0.5
     }
+
+    fn shares(&self, _: &(T, T), _: &(T, T), residuals: &mut u32) -> bool {
+        *residuals += 1;
+        self.shared
+    }
 }
 
 /// Of two lines of which one has a point more, a search that tells them apart lasts longer and finds none that is worse.
 fn a_rival_prolongs_the_search<T: Real>() {
     let (mut cases, mut longer) = (0, 0);
     for_each_case(50, |_, rng| {
-        let mut line = Line::<T>::new(rng, 31, 80);
-        line.points.extend((0..30).map(|_| {
-            let x = rng.range(-5.0, 5.0);
-            (lit(x), lit(-0.5 * x - 1.0 + 0.01 * rng.normal()))
-        }));
-        let mut lines = Lines { line, told_apart: false };
+        let mut lines = Lines::<T>::new(rng, 80);
         let once = ransac(&lines, &RansacOptions::default(), None, 5, None).report;
         lines.told_apart = true;
         let rivalled = ransac(&lines, &RansacOptions::default(), None, 5, None).report;
@@ -189,6 +202,24 @@ fn a_rival_prolongs_the_search<T: Real>() {
         cases += 1;
         longer +=
             (rivalled.spent.iterations > once.spent.iterations && rivalled.rival_share > lit(0.9)) as u32;
+    });
+    assert!(longer > 0 || cases < 10);
+}
+
+/// A rival that explains the same points does not prolong a search of many samples, but is told.
+fn a_rival_that_shares_is_none<T: Real>() {
+    let (mut cases, mut longer) = (0, 0);
+    for_each_case(50, |_, rng| {
+        let mut lines = Lines::<T>::new(rng, 200);
+        let once = ransac(&lines, &RansacOptions::default(), None, 5, None).report;
+        lines.told_apart = true;
+        let rivalled = ransac(&lines, &RansacOptions::default(), None, 5, None).report;
+        lines.shared = true;
+        let shared = ransac(&lines, &RansacOptions::default(), None, 5, None).report;
+        assert_eq!((shared.spent.iterations, shared.cost), (once.spent.iterations, once.cost));
+        cases += 1;
+        let asked = shared.spent.residuals > once.spent.residuals && shared.rival_share > lit(0.9);
+        longer += (asked && rivalled.spent.iterations > shared.spent.iterations) as u32;
     });
     assert!(longer > 0 || cases < 10);
 }
@@ -217,6 +248,7 @@ both!(
     engine_obeys_its_limits,
     order_is_used,
     a_rival_prolongs_the_search,
+    a_rival_that_shares_is_none,
     probabilities
 );
 

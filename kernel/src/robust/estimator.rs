@@ -76,6 +76,13 @@ pub trait Estimator<T: Real, const S: usize> {
         false
     }
 
+    /// True where two different solutions explain the same correspondences but for a few, as any two poses do between which a
+    /// plane or a rotation leaves the choice: then more samples hardly tell them apart, and in a run of more than a few
+    /// samples [`RIVALLED_DISCOVERIES`](Self::RIVALLED_DISCOVERIES) are not asked for. Adds the residuals evaluated.
+    fn shares(&self, _optimum: &Self::Model, _other: &Self::Model, _residuals: &mut u32) -> bool {
+        false
+    }
+
     /// True where more samples would lead to a model that is no better than this one, the best so far, for what all of
     /// them tell: then [`DISCOVERIES`](Self::DISCOVERIES) asks for no more. Adds the residuals evaluated.
     fn settles(&self, _model: &Self::Model, _residuals: &mut u32) -> bool {

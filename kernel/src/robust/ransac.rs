@@ -23,6 +23,9 @@ const SAME_OPTIMUM: f64 = 0.003;
 
 /// Another solution is a rival where what it explains less than the best is smaller than this share.
 const RIVAL: f64 = 0.1;
+/// A run for which no more iterations than these are needed lasts longer for any rival, also for one that explains the same
+/// correspondences.
+const BRIEF: u32 = 128;
 
 /// What a run found, and how it went.
 #[derive(Clone, Copy, Debug)]
@@ -40,9 +43,9 @@ pub struct Consensus<M, T> {
 /// until that one explains more than chance); the run
 /// ends once samples enough for the inliers of the best optimised model have been drawn. Where samples lead to different
 /// optima, one sample of inliers is not enough: until [`Estimator::DISCOVERIES`] of them have led to the best one
-/// ([`Estimator::RIVALLED_DISCOVERIES`] where another solution came near; half as many where most correspondences agree with
-/// the best), so many times as many samples, and as many again twice, are asked
-/// for. A run that has found less than a consensus of any use ([`Estimator::least_consensus`]) ends once samples enough
+/// ([`Estimator::RIVALLED_DISCOVERIES`] where another solution came near, which in a longer run must explain other
+/// correspondences; half as many where most agree with the best), so many times as many samples, and as many again twice,
+/// are asked for. A run that has found less than a consensus of any use ([`Estimator::least_consensus`]) ends once samples enough
 /// for one have been drawn. With an order, ranked and uniform samples alternate: the best ranked ones may lie close together.
 ///
 /// # Input
@@ -168,8 +171,16 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
             }
             search.add_up();
         }
-        let former = best.as_ref().map(|(model, score)| (*score, estimator.differs(&candidate.0, model)));
-        let leads = former.is_none_or(|(former, _)| candidate.1.cost < former.cost);
+        let former = best.as_ref().map(|(model, score)| {
+            let differs = estimator.differs(&candidate.0, model);
+            let contends = differs
+                && search.would_be_rivalled(&candidate.1, score)
+                && (search.needed <= BRIEF
+                    || !estimator.shares(&candidate.0, model, &mut search.refined_residuals));
+            Former { score: *score, differs, contends }
+        });
+        search.add_up();
+        let leads = former.as_ref().is_none_or(|former| candidate.1.cost < former.score.cost);
         if leads {
             if estimator.reject(&candidate.0) {
                 continue;
@@ -196,6 +207,14 @@ struct Manners {
     score_passes: u32,
 }
 
+/// The best optimum before another, whether the two are different solutions, and whether they contend: the run then lasts
+/// longer.
+struct Former<T> {
+    score: Score<T>,
+    differs: bool,
+    contends: bool,
+}
+
 /// What a run keeps beside its model: the same code for every estimator.
 struct Search<'a, T> {
     options: &'a RansacOptions<T>,
@@ -217,7 +236,8 @@ struct Search<'a, T> {
     least_needed: u32,
     /// The least cost of another solution than the best.
     rival: T,
-    /// Whether it comes near the best.
+    /// The cost of the last that contended with the best, and whether it comes near the best.
+    contender: T,
     rivalled: bool,
     gate: Gate<T>,
     /// What may be spent when another hypothesis is looked at, and whether more has been.
@@ -258,6 +278,7 @@ impl<'a, T: Real> Search<'a, T> {
             least_consensus: 0,
             least_needed: u32::MAX,
             rival: from_u32(count),
+            contender: from_u32(count),
             rivalled: false,
             last_start: options.budget.max_residuals.saturating_sub(one_score),
             exhausted: options.budget.max_residuals < one_score,
@@ -366,24 +387,42 @@ impl<'a, T: Real> Search<'a, T> {
         self.spent.residuals = self.counts.residuals.saturating_add(self.refined_residuals);
     }
 
-    /// After another optimum has been found; `former` is the best one before, and whether the two are different solutions.
-    fn has_found(&mut self, score: &Score<T>, former: Option<(Score<T>, bool)>) {
+    /// True where a solution of such a cost comes near the best, of the least.
+    fn near(&self, cost: T, least: T) -> bool {
+        let all = from_u32::<T>(self.count);
+        all - cost > (all - least) * lit(1.0 - RIVAL)
+    }
+
+    /// True where the best of two optima has no rival but for the other.
+    fn would_be_rivalled(&self, a: &Score<T>, b: &Score<T>) -> bool {
+        let least = min(a.cost, b.cost);
+        self.near(max(a.cost, b.cost), least) && !self.near(self.contender, least)
+    }
+
+    /// After another optimum than the best one before has been found.
+    fn has_found(&mut self, score: &Score<T>, former: Option<Former<T>>) {
         let all = from_u32::<T>(self.count);
         let mut same = all * lit(SAME_OPTIMUM);
         if self.most_agree() {
             same = max(same, T::ONE);
         }
-        if let Some((best, true)) = former {
-            self.rival = min(self.rival, max(score.cost, best.cost));
+        let best = former.as_ref().map(|former| former.score.cost);
+        if let Some(Former { score: best, differs, contends }) = former {
+            let cost = max(score.cost, best.cost);
+            if differs {
+                self.rival = min(self.rival, cost);
+            }
+            if contends {
+                self.contender = cost;
+            }
         }
-        let least = former.map_or(score.cost, |(best, _)| min(score.cost, best.cost));
-        self.rivalled = all - self.rival > (all - least) * lit(1.0 - RIVAL);
-        self.discoveries = match former {
-            Some((best, _)) if score.cost > best.cost + same => self.discoveries,
-            Some((best, _)) if score.cost > best.cost - same => self.discoveries.saturating_add(1),
+        self.rivalled = self.near(self.contender, best.map_or(score.cost, |best| min(score.cost, best)));
+        self.discoveries = match best {
+            Some(best) if score.cost > best + same => self.discoveries,
+            Some(best) if score.cost > best - same => self.discoveries.saturating_add(1),
             _ => 1,
         };
-        if former.is_none_or(|(best, _)| score.cost < best.cost) {
+        if best.is_none_or(|best| score.cost < best) {
             self.spent.inliers = score.inliers;
             self.needed = iterations_needed(self.options.confidence, score.inliers, self.count, self.size);
             let inliers = core::cmp::max(self.least_inliers, self.minimal.inliers);

@@ -3,11 +3,9 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::Real;
-use crate::geometry::Essential;
 use crate::geometry::pose::nearest_rotation;
-use crate::linalg::vec3::{cross, dot};
-use crate::linalg::{self, LANES, Lanes, add_outer, times};
-use crate::real::{abs, from_u32, lit, min, sqrt};
+use crate::linalg::{LANES, Lanes, add_outer};
+use crate::real::{from_u32, lit, min};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock};
 use crate::refine::homography::{RotationModel, transfer_sq};
 use crate::refine::lm::{
@@ -21,6 +19,7 @@ use crate::solvers::relpose_5pt;
 use super::super::chance::{EXPLAINED_SIGMAS, least_beyond_chance, line_accident};
 use super::super::degenerate::repeated;
 use super::super::stride;
+use super::in_front::pose_in_front;
 use super::prior::RotationPrior;
 
 /// Correspondences and what a score of them needs.
@@ -64,6 +63,9 @@ const TURN_SIGMAS: [u32; 5] = [64, 24, 12, 8, 5];
 const FINE_SIGMAS: [u32; 2] = [8, 5];
 /// Squared distance beyond which poses are different solutions: some ten degrees of rotation or translation.
 const APART_SQ: f64 = 0.03;
+/// Two poses share their inliers but for one in so many of the pose that has more, and so many accidents.
+const UNSHARED_ONE_IN: u32 = 10;
+const UNSHARED: u32 = 3;
 /// Rays closer to parallel than this many thresholds say nothing about depth.
 const PARALLEL: f64 = 1.0;
 
@@ -425,72 +427,27 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
         optimum.distance_sq(other) > lit(APART_SQ)
     }
 
+    fn shares(&self, optimum: &PoseModel<T>, other: &PoseModel<T>, residuals: &mut u32) -> bool {
+        let views = [self.view(optimum), self.view(other)];
+        let (mut inliers, mut both) = ([0u32; 2], 0u32);
+        let mut left = self.data.count;
+        for block in self.data.blocks {
+            let [a, b] = [&views[0], &views[1]].map(|view| self.squared(block, view));
+            for ((a, b), _) in a.into_iter().zip(b).zip(0..left) {
+                let [a, b] = [(a < T::ONE) as u32, (b < T::ONE) as u32];
+                inliers = [inliers[0] + a, inliers[1] + b];
+                both += a & b;
+            }
+            left = left.saturating_sub(LANES);
+        }
+        *residuals += 2 * self.data.count as u32;
+        let most = core::cmp::max(inliers[0], inliers[1]);
+        most - both <= most / UNSHARED_ONE_IN + UNSHARED
+    }
+
     fn settles(&self, model: &PoseModel<T>, residuals: &mut u32) -> bool {
         let tried = TURN_PASSES * core::cmp::min(TURNED_BLOCKS * LANES, self.data.count) as u32;
         *residuals = residuals.saturating_add(tried);
         self.turns(model)
     }
-}
-
-/// The first pose of an essential matrix for which all five points lie in front of both cameras, those with parallel
-/// rays left aside; none where there is none. Horn's closed form, without a singular value decomposition.
-///
-/// # References
-/// B. K. P. Horn, "Recovering baseline and orientation from essential matrix", 1990.
-fn pose_in_front<T: Real>(
-    essential: &Essential<T>,
-    f1: &[Vector3<T>; 5],
-    f2: &[Vector3<T>; 5],
-    parallel_sq: T,
-) -> Option<(Matrix3<T>, Vector3<T>)> {
-    let e = &essential.0.data.0;
-    let products = [cross(&e[1], &e[2]), cross(&e[2], &e[0]), cross(&e[0], &e[1])];
-    // t is orthogonal to every column: the longest of their cross products.
-    let (mut t, mut longest) = (products[0], T::ZERO);
-    for product in products {
-        let length = dot(&product, &product);
-        if length > longest {
-            (t, longest) = (product, length);
-        }
-    }
-    let size = essential.0.norm_squared() * T::HALF;
-    if !(longest > T::ZERO && size > T::ZERO) {
-        return None;
-    }
-    let scale = T::ONE / sqrt(longest);
-    let t = Vector3::new(t[0] * scale, t[1] * scale, t[2] * scale);
-    // With |t| = 1 and E scaled to |E|^2 = 2: R = cof(E) - [t]x E, or with -t.
-    let scale = T::ONE / sqrt(size);
-    let turned = linalg::cross(&t, &essential.0).data.0;
-    for side in [-scale, scale] {
-        let mut rotation = essential.0;
-        for j in 0..3 {
-            for i in 0..3 {
-                rotation.data.0[j][i] = products[j][i] * (scale * scale) + turned[j][i] * side;
-            }
-        }
-        let mut sign = T::ZERO;
-        let mut consistent = true;
-        for (x1, x2) in f1.iter().zip(f2) {
-            let a = times(&rotation, x1);
-            let (aa, bb, ab) = (a.norm_squared(), x2.norm_squared(), a.dot(x2));
-            if aa * bb - ab * ab <= parallel_sq * aa * bb && ab > T::ZERO {
-                continue;
-            }
-            let (ta, tb) = (t.dot(&a), t.dot(x2));
-            let (depth1, depth2) = (ab * tb - bb * ta, aa * tb - ab * ta);
-            if !(depth1 * depth2 > T::ZERO && depth1 * sign >= T::ZERO) {
-                consistent = false;
-                break;
-            }
-            sign = depth1;
-        }
-        if consistent {
-            let t = if sign < T::ZERO { -t } else { t };
-            // A matrix that is not close to essential gives no rotation.
-            let off = abs(rotation.norm_squared() - lit(3.0));
-            return (off < lit(0.1)).then_some((rotation, t));
-        }
-    }
-    None
 }
