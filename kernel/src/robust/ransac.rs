@@ -171,23 +171,24 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
             }
             search.add_up();
         }
-        let former = best.as_ref().map(|(model, score)| {
+        let mut former = Former { cost: T::MAX, differs: false, contends: false };
+        if let Some((model, score)) = &best {
             let differs = estimator.differs(&candidate.0, model);
             let contends = differs
-                && search.would_be_rivalled(&candidate.1, score)
+                && search.would_be_rivalled(candidate.1.cost, score.cost)
                 && (search.needed <= BRIEF
                     || !estimator.shares(&candidate.0, model, &mut search.refined_residuals));
-            Former { score: *score, differs, contends }
-        });
+            former = Former { cost: score.cost, differs, contends };
+        }
         search.add_up();
-        let leads = former.as_ref().is_none_or(|former| candidate.1.cost < former.score.cost);
+        let leads = candidate.1.cost < former.cost;
         if leads {
             if estimator.reject(&candidate.0) {
                 continue;
             }
             best = Some(candidate);
         }
-        search.has_found(&candidate.1, former);
+        search.has_found(&candidate.1, &former);
         if leads && search.discoveries < search.wanted() {
             if estimator.settles(&candidate.0, &mut search.refined_residuals) {
                 search.discoveries = u32::MAX;
@@ -207,10 +208,10 @@ struct Manners {
     score_passes: u32,
 }
 
-/// The best optimum before another, whether the two are different solutions, and whether they contend: the run then lasts
-/// longer.
+/// The cost of the best optimum before another, if there was one, whether the two are different solutions, and whether they
+/// contend: the run then lasts longer.
 struct Former<T> {
-    score: Score<T>,
+    cost: T,
     differs: bool,
     contends: bool,
 }
@@ -394,35 +395,35 @@ impl<'a, T: Real> Search<'a, T> {
     }
 
     /// True where the best of two optima has no rival but for the other.
-    fn would_be_rivalled(&self, a: &Score<T>, b: &Score<T>) -> bool {
-        let least = min(a.cost, b.cost);
-        self.near(max(a.cost, b.cost), least) && !self.near(self.contender, least)
+    #[cfg_attr(small, inline(never))]
+    fn would_be_rivalled(&self, a: T, b: T) -> bool {
+        let least = min(a, b);
+        self.near(max(a, b), least) && !self.near(self.contender, least)
     }
 
     /// After another optimum than the best one before has been found.
-    fn has_found(&mut self, score: &Score<T>, former: Option<Former<T>>) {
+    fn has_found(&mut self, score: &Score<T>, former: &Former<T>) {
         let all = from_u32::<T>(self.count);
         let mut same = all * lit(SAME_OPTIMUM);
         if self.most_agree() {
             same = max(same, T::ONE);
         }
-        let best = former.as_ref().map(|former| former.score.cost);
-        if let Some(Former { score: best, differs, contends }) = former {
-            let cost = max(score.cost, best.cost);
-            if differs {
-                self.rival = min(self.rival, cost);
-            }
-            if contends {
-                self.contender = cost;
-            }
+        let (least, most) = (min(score.cost, former.cost), max(score.cost, former.cost));
+        if former.differs {
+            self.rival = min(self.rival, most);
         }
-        self.rivalled = self.near(self.contender, best.map_or(score.cost, |best| min(score.cost, best)));
-        self.discoveries = match best {
-            Some(best) if score.cost > best + same => self.discoveries,
-            Some(best) if score.cost > best - same => self.discoveries.saturating_add(1),
-            _ => 1,
+        if former.contends {
+            self.contender = most;
+        }
+        self.rivalled = self.near(self.contender, least);
+        self.discoveries = if score.cost > former.cost + same {
+            self.discoveries
+        } else if score.cost > former.cost - same {
+            self.discoveries.saturating_add(1)
+        } else {
+            1
         };
-        if best.is_none_or(|best| score.cost < best) {
+        if score.cost < former.cost {
             self.spent.inliers = score.inliers;
             self.needed = iterations_needed(self.options.confidence, score.inliers, self.count, self.size);
             let inliers = core::cmp::max(self.least_inliers, self.minimal.inliers);

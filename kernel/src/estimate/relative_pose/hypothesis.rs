@@ -142,12 +142,15 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
         let others = core::cmp::min(others, full.len().saturating_sub(1));
         let mut seen = 0;
         for k in 1..=others {
-            // Blocks of the list and of the list turned by `shift`, which is never a whole turn.
+            // Never a whole turn.
             let shift = k * full.len() / (others + 1);
-            let (start, end) = full.split_at_checked(shift).unwrap_or((full, &[]));
-            for (block, other) in full.iter().zip(end.iter().chain(start)).step_by(every) {
-                each(&block.mispaired(other));
-                seen += LANES as u32;
+            for at in (0..full.len()).step_by(every) {
+                let other = at + shift;
+                let other = if other < full.len() { other } else { other - full.len() };
+                if let (Some(block), Some(other)) = (full.get(at), full.get(other)) {
+                    each(&block.mispaired(other));
+                    seen += LANES as u32;
+                }
             }
         }
         seen
@@ -428,21 +431,13 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
     }
 
     fn shares(&self, optimum: &PoseModel<T>, other: &PoseModel<T>, residuals: &mut u32) -> bool {
-        let views = [self.view(optimum), self.view(other)];
-        let (mut inliers, mut both) = ([0u32; 2], 0u32);
-        let mut left = self.data.count;
-        for block in self.data.blocks {
-            let [a, b] = [&views[0], &views[1]].map(|view| self.squared(block, view));
-            for ((a, b), _) in a.into_iter().zip(b).zip(0..left) {
-                let [a, b] = [(a < T::ONE) as u32, (b < T::ONE) as u32];
-                inliers = [inliers[0] + a, inliers[1] + b];
-                both += a & b;
-            }
-            left = left.saturating_sub(LANES);
-        }
-        *residuals += 2 * self.data.count as u32;
-        let most = core::cmp::max(inliers[0], inliers[1]);
-        most - both <= most / UNSHARED_ONE_IN + UNSHARED
+        let [a, b] = [optimum, other].map(|model| self.agreeing(model, SAMPLED_BLOCKS));
+        let lanes = a.lanes.as_flattened().iter().zip(b.lanes.as_flattened());
+        let both = lanes.fold(0u32, |both, (&a, &b)| both + (a & b) as u32);
+        let looked_at = core::cmp::min(SAMPLED_BLOCKS * LANES, self.data.count) as u32;
+        *residuals = residuals.saturating_add(2 * looked_at);
+        let most = core::cmp::max(a.count, b.count);
+        most.saturating_sub(both) <= most / UNSHARED_ONE_IN + UNSHARED
     }
 
     fn settles(&self, model: &PoseModel<T>, residuals: &mut u32) -> bool {
