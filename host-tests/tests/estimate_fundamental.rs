@@ -6,6 +6,7 @@ use epipole::estimate::{
 };
 use epipole::nalgebra::{Matrix3, Vector2};
 use epipole::real::lit;
+use epipole::refine::{self, RefineTwoViewOptions};
 use epipole::robust::{Guide, OptionsError, StopReason};
 use epipole::{InputError, Real};
 use epipole_host_tests::scenes::{Motion, Scene, Shape, TwoView, calibration};
@@ -73,6 +74,24 @@ in_both_scalars! {
                 let estimate = run(&x1, &x2, &options(2.0));
                 estimate.fundamental().is_some_and(|f| distance(&f.0, &scene) < 1.5)
             }).assert_at_least(0.96);
+        }
+    }
+
+    /// Wrong matches that lie on their epipolar lines have the leverage of points close by.
+    fn accidents_do_not_bend_it<T>() {
+        for motion in [Motion::General, Motion::Forward] {
+            let (mut all, mut inliers_alone) = (0.0, 0.0);
+            for_each_case(40, |seed, _| {
+                let scene = scene(motion, 1.0, 0.6, seed);
+                let (x1, x2) = scene.pixels::<T>();
+                let Some(f) = run(&x1, &x2, &options(2.0)).fundamental() else { return };
+                let (y1, y2): (Vec<_>, Vec<_>) =
+                    x1.iter().zip(&x2).zip(&scene.inlier).filter(|(_, inlier)| **inlier).map(|(x, _)| x).unzip();
+                let best = refine::fundamental(&y1, &y2, &f, &RefineTwoViewOptions::default()).unwrap().unwrap();
+                all += distance(&f.0, &scene);
+                inliers_alone += distance(&best.model.0, &scene);
+            });
+            assert!(all < 1.3 * inliers_alone, "{motion:?}: {all} px with wrong matches, {inliers_alone} without");
         }
     }
 

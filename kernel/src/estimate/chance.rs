@@ -110,23 +110,39 @@ pub(super) fn measured_accident<T: Real, B: Block<T>>(
     unseen: u32,
     squared: impl Fn(&B, &B) -> Lanes<T>,
 ) -> T {
+    let mut hits = 0u32;
+    let seen = for_each_other(data, others, 1, |block, other| {
+        for s in squared(block, other) {
+            hits += (s < T::ONE) as u32;
+        }
+    });
+    let share = from_u32::<T>(hits + unseen) / from_u32(seen + unseen);
+    if seen > 0 && share > least { share } else { least }
+}
+
+/// Calls `visit` with every `every`-th full block and with a block of other correspondences, so many `others` of each; how many
+/// correspondences those were.
+pub(super) fn for_each_other<T: Real, B: Block<T>>(
+    data: BlockSlice<'_, B>,
+    others: usize,
+    every: usize,
+    mut visit: impl FnMut(&B, &B),
+) -> u32 {
     let full = data.blocks.get(..data.count / LANES).unwrap_or(data.blocks);
-    let (mut hits, mut seen) = (0u32, 0u32);
+    let mut seen = 0u32;
     let turns = full.len() * LANES;
     let others = core::cmp::min(others, turns.saturating_sub(1));
+    let every = core::cmp::max(every, 1);
     for k in 1..=others {
         // The list and the list turned by some blocks and lanes, which is never a whole turn.
         let turn = k * turns / (others + 1);
         let (start, end) = full.split_at_checked(turn / LANES).unwrap_or((full, &[]));
-        for (block, other) in full.iter().zip(end.iter().chain(start)) {
-            for s in squared(block, &other.turned(turn)) {
-                hits += (s < T::ONE) as u32;
-            }
+        for (block, other) in full.iter().zip(end.iter().chain(start)).step_by(every) {
+            visit(block, &other.turned(turn));
             seen += LANES as u32;
         }
     }
-    let share = from_u32::<T>(hits + unseen) / from_u32(seen + unseen);
-    if seen > 0 && share > least { share } else { least }
+    seen
 }
 
 /// The two longer sides of the box around the points or bearings of view 2, the shorter of them first.

@@ -3,6 +3,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::relief::{Admitting, Relief};
 use crate::Real;
 use crate::estimate::chance::{least_beyond_chance, line_accident};
 use crate::estimate::stride;
@@ -60,15 +61,18 @@ impl<'a, T: Real> EpipolarProblem<'a, T> {
         T::ONE / (self.threshold * self.threshold)
     }
 
-    /// The model that minimises a loss, from `model`.
+    /// The model that minimises a loss, from `model`, by what a relief admits, if there is one.
     pub(super) fn optimise(
         &self,
         model: &FundamentalModel<T>,
+        relief: Option<&Relief<T>>,
         loss: &Loss<T>,
         passes: u32,
         tolerance: T,
     ) -> Minimum<FundamentalModel<T>, T, 7> {
-        minimise(self.data, model, loss, passes, tolerance)
+        let start = Admitting { model: *model, relief };
+        let Minimum { model, equations, passes } = minimise(self.data, &start, loss, passes, tolerance);
+        Minimum { model: model.model, equations, passes }
     }
 
     /// The truncated cost of a model.
@@ -121,9 +125,9 @@ impl<'a, T: Real> EpipolarProblem<'a, T> {
     fn optimise_locally(&self, model: &FundamentalModel<T>, residuals: &mut u32) -> FundamentalModel<T> {
         // A minimal model is off by more than the noise: inliers are gathered from twice the threshold first.
         let wide = Loss::Truncated(self.threshold * T::TWO);
-        let first = self.optimise(model, &wide, WIDE_PASSES, lit(1e-3));
+        let first = self.optimise(model, None, &wide, WIDE_PASSES, lit(1e-3));
         let loss = Loss::Truncated(self.threshold);
-        let minimum = self.optimise(&first.model, &loss, LOCAL_PASSES, lit(1e-4));
+        let minimum = self.optimise(&first.model, None, &loss, LOCAL_PASSES, lit(1e-4));
         let passes = first.passes + minimum.passes;
         *residuals = residuals.saturating_add(passes.saturating_mul(self.data.count as u32));
         minimum.model

@@ -1,6 +1,7 @@
 //! From a consensus to a verdict on the epipolar geometry.
 
 use super::hypothesis::{EpipolarProblem, ParallaxProblem};
+use super::relief::Relief;
 use super::verdict::FundamentalVerdict;
 use crate::Real;
 use crate::estimate::Unobservable;
@@ -20,9 +21,12 @@ const FINAL_PASSES: u32 = 10;
 /// Where the loss of its two stages ends, in thresholds: of noise of half a threshold one in 1,500 lies beyond the second.
 const WIDE_SUPPORT: f64 = 2.0;
 const SUPPORT: f64 = 1.7;
-/// A plane must explain so many in twenty of the inliers to be the verdict: of a planar scene it explains all but accidents,
-/// which are a fifth where seven in ten of 100 correspondences are wrong.
-const PLANE_SHARE_OF_20: u32 = 14;
+/// Times that what is too near is told from the rest, for a better model tells better.
+const LOOKS: u32 = 2;
+/// A plane must explain so many of the inliers to be the verdict, those aside that are off it by accident: as many as wrong
+/// correspondences bring, and the two that fix the epipole of a planar scene.
+const PLANE_SHARE: f64 = 0.85;
+const FREE: u32 = 2;
 /// A plane is looked for with the threshold of this many standard deviations.
 const PLANE_SIGMAS: f64 = 3.5;
 
@@ -89,6 +93,8 @@ impl<T: Real> Judge<'_, '_, T> {
         if !beyond_chance(count, inliers, 7, accident) {
             return (self.without_model(mask, order), T::ZERO);
         }
+        model = self.relieve(&model);
+        let inliers = self.mark(&model, mask);
         let noise = self.noise(&model);
         // Where the options promise less noise than there is, the data are believed.
         let sigma = max(self.sigma, noise);
@@ -106,16 +112,19 @@ impl<T: Real> Judge<'_, '_, T> {
             if 2 * split.on > inliers {
                 let off = order.get(..split.outside as usize).unwrap_or(&[]);
                 if let Some(other) = self.through(&plane, off) {
-                    let other = self.refine(&other);
+                    let other = self.relieve(&self.refine(&other));
                     if self.problem.cost(&other) < self.problem.cost(&model) {
                         model = other;
                         self.mark(&model, mask);
                     }
                 }
                 let split = self.split(&plane, sigma, mask, order);
-                let holds = 20 * split.on >= PLANE_SHARE_OF_20 * (split.on + split.off);
+                let accidents = from_u32::<T>(split.outside) * accident + from_u32(FREE);
+                let off = max(from_u32::<T>(split.off) - accidents, T::ZERO);
+                let on = from_u32::<T>(split.on);
+                let holds = on >= (on + off) * lit(PLANE_SHARE);
                 if holds
-                    && !beyond_chance(split.outside, split.off, 2, accident)
+                    && !beyond_chance(split.outside, split.off, FREE, accident)
                     && let Some(homography) = self.frame.homography(&plane.0)
                 {
                     self.mark_plane(&plane, sigma, mask);
@@ -132,9 +141,28 @@ impl<T: Real> Judge<'_, '_, T> {
     /// The model that all inliers support: first with what lies just beyond the threshold at a falling weight, then with all
     /// of what noise explains at the same.
     fn refine(&self, model: &FundamentalModel<T>) -> FundamentalModel<T> {
-        let [wide, support] = [WIDE_SUPPORT, SUPPORT].map(|share| self.problem.threshold * lit(share));
-        let near = self.problem.optimise(model, &Loss::Tukey(wide), FINAL_PASSES, lit(1e-3)).model;
-        self.problem.optimise(&near, &Loss::Truncated(support), FINAL_PASSES, lit(1e-6)).model
+        let wide = Loss::Tukey(self.problem.threshold * lit(WIDE_SUPPORT));
+        let near = self.problem.optimise(model, None, &wide, FINAL_PASSES, lit(1e-3)).model;
+        self.fit(&near, None)
+    }
+
+    /// The same of what is not too near to be right.
+    fn relieve(&self, model: &FundamentalModel<T>) -> FundamentalModel<T> {
+        let mut model = *model;
+        for _ in 0..LOOKS {
+            let relief = Relief::of(self.problem, &model, self.support());
+            model = self.fit(&model, relief.as_ref());
+        }
+        model
+    }
+
+    fn fit(&self, model: &FundamentalModel<T>, relief: Option<&Relief<T>>) -> FundamentalModel<T> {
+        let loss = Loss::Truncated(self.support());
+        self.problem.optimise(model, relief, &loss, FINAL_PASSES, lit(1e-6)).model
+    }
+
+    fn support(&self) -> T {
+        self.problem.threshold * lit(SUPPORT)
     }
 
     /// Writes the inliers and counts them.
@@ -155,7 +183,7 @@ impl<T: Real> Judge<'_, '_, T> {
     /// Root of the mean squared residual of the inliers.
     fn noise(&self, model: &FundamentalModel<T>) -> T {
         let problem = self.problem;
-        let sums = problem.optimise(model, &Loss::Truncated(problem.threshold), 1, T::ZERO).equations;
+        let sums = problem.optimise(model, None, &Loss::Truncated(problem.threshold), 1, T::ZERO).equations;
         let outside = from_u32::<T>((problem.data.count as u32).saturating_sub(sums.active));
         let squares = sums.cost - outside * problem.threshold * problem.threshold;
         sqrt(max(squares, T::ZERO) / from_u32(core::cmp::max(sums.active.saturating_sub(7), 1)))
