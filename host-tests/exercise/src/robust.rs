@@ -135,6 +135,7 @@ pub(crate) fn engine<T: Real>(source: &mut Source<'_>, sink: &mut Sink) {
     sink.numbers(location.polish(&source.scalar(), T::MAX, &mut ScoreCounts::default()).iter());
     sink.flag(location.leads_back(&T::ONE, &T::ZERO));
     sink.flag(location.differs(&T::ONE, &T::ZERO));
+    sink.flag(location.shares(&T::ONE, &T::ZERO, &mut 0));
     sink.count(location.least_consensus() as usize);
     let consensus = ransac(&location, &options, None, 3, Some(&mut keep_going));
     if let Some((model, score)) = consensus.best {
