@@ -105,7 +105,7 @@ impl<T: Real> EpipolarModel<T, 7> for FundamentalModel<T> {
         (self.matrix, self.tangents())
     }
 
-    #[cfg_attr(not(small), inline(always))]
+    #[inline(always)]
     fn inside<B: EpipolarBlock<T>>((matrix, _): &Self::Frame, block: &B, l: usize, limit: T) -> bool {
         let (c, d) = block.residual_of(matrix, l);
         c * c < limit * d

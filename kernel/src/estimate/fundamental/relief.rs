@@ -123,15 +123,12 @@ impl<T: Real> Relief<T> {
         let data = problem.data;
         let full = data.blocks.get(..data.count / LANES).unwrap_or(data.blocks);
         let every = core::cmp::max(full.len() / BLOCKS, 1);
-        let within = support * support;
-        let inside = |block: &PlaneBlock<T>, l: usize| {
-            let (c, d) = block.residual_of(&model.matrix, l);
-            c * c < within * d
-        };
+        let (frame, within) = (model.frame(), support * support);
         let inliers = |visit: &mut dyn FnMut(&[T; 3], &[T; 3])| {
-            for block in full.iter().step_by(every) {
+            // At least one already, which the optimiser does not see through memory.
+            for block in full.iter().step_by(core::cmp::max(every, 1)) {
                 for l in 0..LANES {
-                    if inside(block, l)
+                    if FundamentalModel::inside(&frame, block, l, within)
                         && let Some((x1, x2)) = block.directions(l)
                     {
                         visit(&x1, &x2);
@@ -146,7 +143,7 @@ impl<T: Real> Relief<T> {
         // How many lie beyond each edge; the zeroth counts all.
         let count = |block: &PlaneBlock<T>, beyond: &mut [u32; EDGES]| {
             for l in 0..LANES {
-                if inside(block, l) {
+                if FundamentalModel::inside(&frame, block, l, within) {
                     let squared = relief.squared(block, l);
                     let mut edge = lit(FIRST_EDGE);
                     for entry in beyond.iter_mut() {
@@ -211,7 +208,7 @@ impl<'a, T: Real> EpipolarModel<T, 7> for Admitting<'a, T> {
         (self.model.frame(), self.relief)
     }
 
-    #[cfg_attr(not(small), inline(always))]
+    #[inline(always)]
     fn inside<B: EpipolarBlock<T>>((frame, relief): &Self::Frame, block: &B, l: usize, limit: T) -> bool {
         FundamentalModel::inside(frame, block, l, limit)
             && relief.is_none_or(|relief| relief.admits(block, l))
