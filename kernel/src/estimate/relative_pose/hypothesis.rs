@@ -430,12 +430,15 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
         optimum.distance_sq(other) > lit(APART_SQ)
     }
 
+    // Not inlined: its samples take no stack while a sample is solved.
+    #[inline(never)]
     fn shares(&self, optimum: &PoseModel<T>, other: &PoseModel<T>, residuals: &mut u32) -> bool {
-        let [a, b] = [optimum, other].map(|model| self.agreeing(model, SAMPLED_BLOCKS));
-        let lanes = a.lanes.as_flattened().iter().zip(b.lanes.as_flattened());
-        let both = lanes.fold(0u32, |both, (&a, &b)| both + (a & b) as u32);
-        let looked_at = core::cmp::min(SAMPLED_BLOCKS * LANES, self.data.count) as u32;
-        *residuals = residuals.saturating_add(2 * looked_at);
+        let (a, b) = (self.agreeing(optimum, SAMPLED_BLOCKS), self.agreeing(other, SAMPLED_BLOCKS));
+        let mut both = 0u32;
+        for (a, b) in a.lanes.as_flattened().iter().zip(b.lanes.as_flattened()) {
+            both += (a & b) as u32;
+        }
+        *residuals = residuals.saturating_add(2 * self.data.count as u32);
         let most = core::cmp::max(a.count, b.count);
         most.saturating_sub(both) <= most / UNSHARED_ONE_IN + UNSHARED
     }

@@ -54,7 +54,6 @@ impl<T: Real, B: EpipolarBlock<T>> PoseProblem<'_, T, B> {
     /// The squared distance from view 1, in baselines, from which on those within `support` of a pose take part; zero where
     /// all do. Of the limits the one that leaves out the most accidents, less a share of the right ones; how many accidents
     /// there are is measured on correspondences with view 2 of another, times as many as do not agree.
-    #[inline(never)]
     pub(super) fn nearest_sq(&self, model: &PoseModel<T>, support: T) -> T {
         let (frame, limit) = (model.frame(), support * support);
         let (mut agreeing, mut accidents) = (Near::default(), Near::default());
