@@ -88,8 +88,8 @@ pub type RelativePoseError = TwoViewError;
 /// That of a maximum-likelihood fit to the inliers (Tukey's loss, ending at six standard deviations of the noise found,
 /// with more than 150 inliers at fewer, down to 3.5, and at 0.8 to 2.6 thresholds), in `f32` as in `f64`. Wrong
 /// correspondences that agree by accident seem to lie near the cameras, where they would move the pose as hundreds of
-/// others do: what lies nearer than a limit below which they are more than one in six counts as an outlier, at most a
-/// quarter of what agrees; how many there are is measured on mispaired correspondences. The
+/// others do: what lies nearer than a limit counts as an outlier where the translation is more certain without, at most a
+/// quarter of what agrees; how many of them there are is measured on mispaired correspondences. The
 /// covariances are those of M-estimates with the noise found: over 1,000 scenes of 100 points, with no and with 20 %
 /// outliers, the mean normalised squared errors lie within their 95 % bounds, but for the few poses led astray.
 ///
