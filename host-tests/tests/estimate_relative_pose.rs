@@ -578,3 +578,37 @@ fn accidental_inliers_are_left_out() {
         assert!(right > 5600 && wrong < 40, "{motion:?}: {right} {wrong}");
     }
 }
+
+/// A near object that tells most of the translation is kept, though wrong matches seem to lie as near.
+#[test]
+fn a_near_object_is_kept() {
+    let camera = scene_camera();
+    let mut options = options();
+    options.max_error_px = 2.0;
+    let mut kept = 0;
+    for_each_case(30, |seed, rng| {
+        // One right match in seven at two baselines, the others at 20 to 60; three in five are wrong.
+        let truth = Scene::new(Motion::General, 8).generate(seed).pose;
+        let length = truth.translation.vector.norm();
+        let (mut x1, mut x2) = (Vec::new(), Vec::new());
+        let mut pixel = |rng: &mut Rng| Vector2::new(rng.range(0.0, 640.0), rng.range(0.0, 480.0));
+        while x1.len() < 400 {
+            let right = x1.len() < 100;
+            let near = x1.len() < 10;
+            let p = pixel(rng);
+            let depth = length * if near { rng.range(2.0, 2.5) } else { rng.range(20.0, 60.0) };
+            let point = camera.unproject(&p).unwrap();
+            let seen = camera.project(&(truth * Point3::from(point * (depth / point.z))).coords);
+            let noise = |rng: &mut Rng| Vector2::new(rng.normal(), rng.normal());
+            let Some(q) = seen else { continue };
+            x1.push(p + noise(rng));
+            x2.push(if right { q + noise(rng) } else { pixel(rng) });
+        }
+        let mut memory = Memory::new(400);
+        let mut workspace = memory.workspace();
+        refine_relative_pose(&camera, &camera, &x1, &x2, &truth, &options, &mut workspace).unwrap().unwrap();
+        kept += workspace.inliers()[..10].iter().filter(|&&inlier| inlier).count();
+    });
+    println!("of 300 near right ones {kept} kept");
+    assert!(kept > 270, "{kept}");
+}
