@@ -98,8 +98,8 @@ pub(crate) trait EpipolarBlock<T: Real>: Block<T> {
     /// A correspondence in a frame along the translation.
     fn sight(&self, frame: &Frame<T>, lane: usize) -> Sight<T>;
 
-    /// The same with what derivatives of the residual need.
-    fn in_frame(&self, frame: &Frame<T>, lane: usize) -> InFrame<T>;
+    /// What derivatives of the residual need beside that.
+    fn slopes(&self, frame: &Frame<T>, lane: usize, sight: &Sight<T>) -> Slopes<T>;
 
     /// The points of a lane, if there is one, on the plane z = 1 (x1, y1, x2, y2), and by how much squared distances there are
     /// to be multiplied: 1 on a plane; for bearings what makes distances angles, NaN where one does not meet the plane.
@@ -143,7 +143,8 @@ impl<T: Real> Sight<T> {
 
     /// Whether the point lies in front of both cameras, or its rays are parallel to within noise, so that its depth says
     /// nothing: `parallel_sq` is the squared sine up to which they are.
-    #[inline(always)]
+    #[cfg_attr(not(small), inline(always))]
+    #[cfg_attr(small, inline(never))]
     pub(crate) fn in_front(&self, parallel_sq: T) -> bool {
         let ([y0, y1, y2], [x0, x1, x2]) = (self.y, self.x);
         // d1 y + e3 = d2 x, in the least-squares sense: both depths times |y x x|^2.
@@ -174,11 +175,9 @@ impl<T: Real> Sight<T> {
     }
 }
 
-/// A correspondence in a [`Frame`], and how its residual moves.
+/// How the residual of a correspondence in a [`Frame`] moves.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct InFrame<T> {
-    /// Where its points are seen.
-    pub(crate) sight: Sight<T>,
+pub(crate) struct Slopes<T> {
     /// `1 / d`; zero where a point lies on both epipoles, which has no residual and no direction to move.
     pub(crate) inverse: T,
     /// `c / d` times the metric's product with the epipolar line of view 1, as a point of view 1.
@@ -200,18 +199,13 @@ fn inverse_or_zero<T: Real>(d: T) -> T {
     if d >= T::MIN_POSITIVE { T::ONE / d } else { T::ZERO }
 }
 
-/// A lane in a frame, and its epipolar lines in view 1 and view 2.
+/// The epipolar lines in view 1 and view 2 of two points in a frame.
 #[inline(always)]
-fn plane_sight<T: Real>(block: &PlaneBlock<T>, frame: &Frame<T>, l: usize) -> (Sight<T>, [T; 2], [T; 2]) {
+fn plane_lines_of<T: Real>(frame: &Frame<T>, y: &[T; 3], x: &[T; 3]) -> ([T; 2], [T; 2]) {
     let (m, n) = (&frame.view1.data.0, &frame.view2.data.0);
-    let (x1, y1, x2, y2) = (block[0][l], block[1][l], block[2][l], block[3][l]);
-    let y = |i: usize| m[0][i] * x1 + m[1][i] * y1 + m[2][i];
-    let x = |i: usize| n[i][0] * x2 + n[i][1] * y2 + n[i][2];
-    let (y, x) = ([y(0), y(1), y(2)], [x(0), x(1), x(2)]);
     let l1 = [m[0][0] * x[1] - m[0][1] * x[0], m[1][0] * x[1] - m[1][1] * x[0]];
     let l2 = [n[1][0] * y[0] - n[0][0] * y[1], n[1][1] * y[0] - n[0][1] * y[1]];
-    let d = (l2[0] * l2[0] + l2[1] * l2[1]) + (l1[0] * l1[0] + l1[1] * l1[1]);
-    (Sight::new(y, x, d), l1, l2)
+    (l1, l2)
 }
 
 /// `F x1` and the first two entries of `F' x2` of a lane.
@@ -247,21 +241,30 @@ impl<T: Real> EpipolarBlock<T> for PlaneBlock<T> {
         (c, inverse, [g0, g1, g2, g3, g4, g5, x1 - s, y1 - t, T::ONE])
     }
 
-    #[inline(always)]
-    fn sight(&self, frame: &Frame<T>, l: usize) -> Sight<T> {
-        plane_sight(self, frame, l).0
+    #[cfg_attr(not(small), inline(always))]
+    #[cfg_attr(small, inline(never))]
+    fn sight(&self, frame: &Frame<T>, lane: usize) -> Sight<T> {
+        let (m, n) = (&frame.view1.data.0, &frame.view2.data.0);
+        // A lane it is already, which is not seen where this is called.
+        let l = lane % LANES;
+        let (x1, y1, x2, y2) = (self[0][l], self[1][l], self[2][l], self[3][l]);
+        let y = |i: usize| m[0][i] * x1 + m[1][i] * y1 + m[2][i];
+        let x = |i: usize| n[i][0] * x2 + n[i][1] * y2 + n[i][2];
+        let (y, x) = ([y(0), y(1), y(2)], [x(0), x(1), x(2)]);
+        let (l1, l2) = plane_lines_of(frame, &y, &x);
+        Sight::new(y, x, (l2[0] * l2[0] + l2[1] * l2[1]) + (l1[0] * l1[0] + l1[1] * l1[1]))
     }
 
     #[inline(always)]
-    fn in_frame(&self, frame: &Frame<T>, l: usize) -> InFrame<T> {
+    fn slopes(&self, frame: &Frame<T>, _: usize, sight: &Sight<T>) -> Slopes<T> {
         let (m, n) = (&frame.view1.data.0, &frame.view2.data.0);
-        let (sight, l1, l2) = plane_sight(self, frame, l);
+        let (l1, l2) = plane_lines_of(frame, &sight.y, &sight.x);
         let inverse = inverse_or_zero(sight.d);
         let k = sight.c * inverse;
         let (s, t) = ([k * l1[0], k * l1[1]], [k * l2[0], k * l2[1]]);
         let z = |i: usize| m[0][i] * s[0] + m[1][i] * s[1];
         let a = |i: usize| n[i][0] * t[0] + n[i][1] * t[1];
-        InFrame { sight, inverse, z: [z(0), z(1), z(2)], a: [a(0), a(1), a(2)] }
+        Slopes { inverse, z: [z(0), z(1), z(2)], a: [a(0), a(1), a(2)] }
     }
 
     fn mispaired(&self, other: &Self) -> Self {
@@ -318,17 +321,13 @@ fn turned2<T: Real>(frame: &Frame<T>, v: &[T; 3]) -> [T; 3] {
     [dot(&n[0], v), dot(&n[1], v), dot(&n[2], v)]
 }
 
-/// A lane in a frame, and the metrics' products with its epipolar lines in view 1 and view 2.
+/// The epipolar lines in view 1 and view 2 of two bearings in a frame.
 #[inline(always)]
-fn bearing_sight<T: Real>(block: &BearingBlock<T>, frame: &Frame<T>, l: usize) -> (Sight<T>, [T; 3], [T; 3]) {
+fn bearing_lines<T: Real>(frame: &Frame<T>, y: &[T; 3], x: &[T; 3]) -> ([T; 3], [T; 3]) {
     let (m, n) = (&frame.view1.data.0, &frame.view2.data.0);
-    let y = turned1(frame, &[block[0][l], block[1][l], block[2][l]]);
-    let x = turned2(frame, &[block[3][l], block[4][l], block[5][l]]);
     let l1 = |j: usize| m[j][0] * x[1] - m[j][1] * x[0];
     let l2 = |i: usize| n[1][i] * y[0] - n[0][i] * y[1];
-    let (l1, l2) = ([l1(0), l1(1), l1(2)], [l2(0), l2(1), l2(2)]);
-    let (n1, n2) = metrics(block, l, &l1, &l2);
-    (Sight::new(y, x, dot(&l2, &n2) + dot(&l1, &n1)), n1, n2)
+    ([l1(0), l1(1), l1(2)], [l2(0), l2(1), l2(2)])
 }
 
 impl<T: Real> EpipolarBlock<T> for BearingBlock<T> {
@@ -358,16 +357,21 @@ impl<T: Real> EpipolarBlock<T> for BearingBlock<T> {
 
     #[inline(always)]
     fn sight(&self, frame: &Frame<T>, l: usize) -> Sight<T> {
-        bearing_sight(self, frame, l).0
+        let y = turned1(frame, &[self[0][l], self[1][l], self[2][l]]);
+        let x = turned2(frame, &[self[3][l], self[4][l], self[5][l]]);
+        let (l1, l2) = bearing_lines(frame, &y, &x);
+        let (n1, n2) = metrics(self, l, &l1, &l2);
+        Sight::new(y, x, dot(&l2, &n2) + dot(&l1, &n1))
     }
 
     #[inline(always)]
-    fn in_frame(&self, frame: &Frame<T>, l: usize) -> InFrame<T> {
-        let (sight, n1, n2) = bearing_sight(self, frame, l);
+    fn slopes(&self, frame: &Frame<T>, l: usize, sight: &Sight<T>) -> Slopes<T> {
+        let (l1, l2) = bearing_lines(frame, &sight.y, &sight.x);
+        let (n1, n2) = metrics(self, l, &l1, &l2);
         let inverse = inverse_or_zero(sight.d);
         let k = sight.c * inverse;
         let (z, a) = (turned1(frame, &n1), turned2(frame, &n2));
-        InFrame { sight, inverse, z: z.map(|z| k * z), a: a.map(|a| k * a) }
+        Slopes { inverse, z: z.map(|z| k * z), a: a.map(|a| k * a) }
     }
 
     fn mispaired(&self, other: &Self) -> Self {

@@ -100,19 +100,23 @@ impl<T: Real> Manifold<T, 7> for FundamentalModel<T> {
 
 impl<T: Real> EpipolarModel<T, 7> for FundamentalModel<T> {
     type Frame = (Matrix3<T>, [[T; 9]; 7]);
+    type Sight = ();
 
     fn frame(&self) -> Self::Frame {
         (self.matrix, self.tangents())
     }
 
     #[inline(always)]
-    fn inside<B: EpipolarBlock<T>>((matrix, _): &Self::Frame, block: &B, l: usize, limit: T) -> bool {
+    fn sight<B: EpipolarBlock<T>>(_: &Self::Frame, _: &B, _: usize) {}
+
+    #[inline(always)]
+    fn inside<B: EpipolarBlock<T>>((matrix, _): &Self::Frame, block: &B, l: usize, limit: T) -> Option<()> {
         let (c, d) = block.residual_of(matrix, l);
-        c * c < limit * d
+        (c * c < limit * d).then_some(())
     }
 
     #[inline(always)]
-    fn row<B: EpipolarBlock<T>>((matrix, tangents): &Self::Frame, block: &B, l: usize) -> Row<T, 7> {
+    fn row<B: EpipolarBlock<T>>((matrix, tangents): &Self::Frame, block: &B, l: usize, _: &()) -> Row<T, 7> {
         let (c, inverse, g) = block.gradient(matrix, l);
         let along = |tangent: &[T; 9]| {
             let mut sum = g[0] * tangent[0];

@@ -28,11 +28,25 @@ pub(crate) trait EpipolarModel<T: Real, const P: usize>: Manifold<T, P> {
     type Frame;
     /// What a pass over the data needs of the model.
     fn frame(&self) -> Self::Frame;
-    /// Whether a correspondence has a squared residual below `limit`, and may be explained by the model at all (is in front of
-    /// the cameras).
-    fn inside<B: EpipolarBlock<T>>(frame: &Self::Frame, block: &B, lane: usize, limit: T) -> bool;
-    /// The residual of a correspondence and its derivatives.
-    fn row<B: EpipolarBlock<T>>(frame: &Self::Frame, block: &B, lane: usize) -> Row<T, P>;
+    /// What is known of a correspondence before its derivatives.
+    type Sight;
+    /// A correspondence as the model sees it.
+    fn sight<B: EpipolarBlock<T>>(frame: &Self::Frame, block: &B, lane: usize) -> Self::Sight;
+    /// The same where it has a squared residual below `limit`, and may be explained by the model at all (is in front of the
+    /// cameras).
+    fn inside<B: EpipolarBlock<T>>(
+        frame: &Self::Frame,
+        block: &B,
+        lane: usize,
+        limit: T,
+    ) -> Option<Self::Sight>;
+    /// Its residual and derivatives.
+    fn row<B: EpipolarBlock<T>>(
+        frame: &Self::Frame,
+        block: &B,
+        lane: usize,
+        sight: &Self::Sight,
+    ) -> Row<T, P>;
     /// Sums by the parameters of the rows, as sums by those of the model.
     fn turn_back(_frame: &Self::Frame, _sums: &mut NormalEquations<T, P>) {}
 }
@@ -127,7 +141,7 @@ impl<T: Real, const P: usize> Sums<T, P> {
     ) {
         let (mut c, mut inverse, mut j) = ([T::ZERO; LANES], [T::ZERO; LANES], [[T::ZERO; LANES]; P]);
         for l in 0..LANES {
-            let row = M::row(frame, block, l);
+            let row = M::row(frame, block, l, &M::sight(frame, block, l));
             (c[l], inverse[l]) = (row.c, row.inverse);
             for p in 0..P {
                 j[p][l] = row.j[p];
@@ -178,7 +192,7 @@ impl<T: Real, const P: usize> Sums<T, P> {
             let (current, lanes) = if let Some(block) = block {
                 let mut inside = [false; LANES];
                 for l in 0..LANES {
-                    inside[l] = M::inside(frame, block, l, limit) & (l < left);
+                    inside[l] = M::inside(frame, block, l, limit).is_some() & (l < left);
                 }
                 seen += core::cmp::min(left, LANES);
                 left = left.saturating_sub(step.saturating_mul(LANES));
@@ -235,9 +249,11 @@ impl<T: Real, const P: usize> Sums<T, P> {
         for block in data.blocks.iter().step_by(step) {
             let mut end = waiting;
             for l in 0..LANES {
-                if l < left && M::inside(frame, block, l, limit) {
+                if l < left
+                    && let Some(sight) = M::inside(frame, block, l, limit)
+                {
                     if let Some(place) = rows.as_flattened_mut().get_mut(end) {
-                        *place = M::row(frame, block, l);
+                        *place = M::row(frame, block, l, &sight);
                     }
                     end += 1;
                 }

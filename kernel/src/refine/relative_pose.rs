@@ -2,7 +2,7 @@
 
 use nalgebra::{ArrayStorage, Matrix3, SVector, Vector3};
 
-use super::blocks::{EpipolarBlock, Frame, InFrame, Sight};
+use super::blocks::{EpipolarBlock, Frame, Sight, Slopes};
 use super::lm::{EpipolarModel, Manifold, NormalEquations, Row};
 use crate::Real;
 use crate::geometry::Pose;
@@ -170,6 +170,7 @@ impl<T: Real> Manifold<T, 5> for PoseModel<T> {
 
 impl<T: Real> EpipolarModel<T, 5> for PoseModel<T> {
     type Frame = PoseFrame<T>;
+    type Sight = Sight<T>;
 
     fn frame(&self) -> PoseFrame<T> {
         let [u, v] = tangent_basis(&self.translation).data.0;
@@ -187,16 +188,22 @@ impl<T: Real> EpipolarModel<T, 5> for PoseModel<T> {
     }
 
     #[inline(always)]
-    fn inside<B: EpipolarBlock<T>>(frame: &PoseFrame<T>, block: &B, l: usize, limit: T) -> bool {
+    fn sight<B: EpipolarBlock<T>>(frame: &PoseFrame<T>, block: &B, l: usize) -> Sight<T> {
+        block.sight(&frame.views, l)
+    }
+
+    #[inline(always)]
+    fn inside<B: EpipolarBlock<T>>(frame: &PoseFrame<T>, block: &B, l: usize, limit: T) -> Option<Sight<T>> {
         let sight = block.sight(&frame.views, l);
-        sight.c * sight.c < limit * sight.d && frame.admits(&sight)
+        (sight.c * sight.c < limit * sight.d && frame.admits(&sight)).then_some(sight)
     }
 
     /// By a rotation of the frame, and by the translation along its first two axes:
     /// `sqrt(d) dr = p (dE y) - x (dE z)` with `p = x - a`, where `dE y = e3 x (w x y)` or `e_k x y`.
     #[inline(always)]
-    fn row<B: EpipolarBlock<T>>(frame: &PoseFrame<T>, block: &B, l: usize) -> Row<T, 5> {
-        let InFrame { sight: Sight { y, x, c, .. }, inverse, z, a } = block.in_frame(&frame.views, l);
+    fn row<B: EpipolarBlock<T>>(frame: &PoseFrame<T>, block: &B, l: usize, sight: &Sight<T>) -> Row<T, 5> {
+        let &Sight { y, x, c, .. } = sight;
+        let Slopes { inverse, z, a } = block.slopes(&frame.views, l, sight);
         let p = [x[0] - a[0], x[1] - a[1], x[2] - a[2]];
         let j = [
             p[0] * y[2] - x[0] * z[2],

@@ -128,7 +128,7 @@ impl<T: Real> Relief<T> {
             // At least one already, which the optimiser does not see through memory.
             for block in full.iter().step_by(core::cmp::max(every, 1)) {
                 for l in 0..LANES {
-                    if FundamentalModel::inside(&frame, block, l, within)
+                    if FundamentalModel::inside(&frame, block, l, within).is_some()
                         && let Some((x1, x2)) = block.directions(l)
                     {
                         visit(&x1, &x2);
@@ -143,7 +143,7 @@ impl<T: Real> Relief<T> {
         // How many lie beyond each edge; the zeroth counts all.
         let count = |block: &PlaneBlock<T>, beyond: &mut [u32; EDGES]| {
             for l in 0..LANES {
-                if FundamentalModel::inside(&frame, block, l, within) {
+                if FundamentalModel::inside(&frame, block, l, within).is_some() {
                     let squared = relief.squared(block, l);
                     let mut edge = lit(FIRST_EDGE);
                     for entry in beyond.iter_mut() {
@@ -203,19 +203,28 @@ impl<T: Real> Manifold<T, 7> for Admitting<'_, T> {
 
 impl<'a, T: Real> EpipolarModel<T, 7> for Admitting<'a, T> {
     type Frame = (<FundamentalModel<T> as EpipolarModel<T, 7>>::Frame, Option<&'a Relief<T>>);
+    type Sight = ();
 
     fn frame(&self) -> Self::Frame {
         (self.model.frame(), self.relief)
     }
 
     #[inline(always)]
-    fn inside<B: EpipolarBlock<T>>((frame, relief): &Self::Frame, block: &B, l: usize, limit: T) -> bool {
+    fn sight<B: EpipolarBlock<T>>(_: &Self::Frame, _: &B, _: usize) {}
+
+    #[inline(always)]
+    fn inside<B: EpipolarBlock<T>>(
+        (frame, relief): &Self::Frame,
+        block: &B,
+        l: usize,
+        limit: T,
+    ) -> Option<()> {
         FundamentalModel::inside(frame, block, l, limit)
-            && relief.is_none_or(|relief| relief.admits(block, l))
+            .filter(|_| relief.is_none_or(|relief| relief.admits(block, l)))
     }
 
     #[inline(always)]
-    fn row<B: EpipolarBlock<T>>((frame, _): &Self::Frame, block: &B, l: usize) -> Row<T, 7> {
-        FundamentalModel::row(frame, block, l)
+    fn row<B: EpipolarBlock<T>>((frame, _): &Self::Frame, block: &B, l: usize, sight: &()) -> Row<T, 7> {
+        FundamentalModel::row(frame, block, l, sight)
     }
 }
