@@ -591,7 +591,7 @@ fn a_near_object_is_kept() {
         let truth = Scene::new(Motion::General, 8).generate(seed).pose;
         let length = truth.translation.vector.norm();
         let (mut x1, mut x2) = (Vec::new(), Vec::new());
-        let mut pixel = |rng: &mut Rng| Vector2::new(rng.range(0.0, 640.0), rng.range(0.0, 480.0));
+        let pixel = |rng: &mut Rng| Vector2::new(rng.range(0.0, 640.0), rng.range(0.0, 480.0));
         while x1.len() < 400 {
             let right = x1.len() < 100;
             let near = x1.len() < 10;
