@@ -50,16 +50,19 @@ impl<T: Real, const L: usize> Neg for Batch<T, L> {
 }
 
 impl<T: Real, const L: usize> Batch<T, L> {
-    /// The same number in all lanes.
+    /// The same number in all lanes. Not `[v; L]`, of which code for size keeps a loop even for one lane.
     #[inline(always)]
     pub(crate) fn splat(v: T) -> Self {
-        Self([v; L])
+        Self(core::array::from_fn(|_| v))
     }
 
     /// `self` times a number common to all lanes.
     #[inline(always)]
-    pub(crate) fn times(self, f: T) -> Self {
-        self * Self::splat(f)
+    pub(crate) fn times(mut self, f: T) -> Self {
+        for x in &mut self.0 {
+            *x *= f;
+        }
+        self
     }
 
     /// Square roots (`sqrt` is a name that the numeric policy forbids as a method).

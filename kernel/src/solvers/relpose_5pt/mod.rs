@@ -289,11 +289,11 @@ impl<T: Real> Found<T> {
     ) {
         let mut first = 0;
         for roots in candidates.roots.chunks_exact(L).take(candidates.len.div_ceil(L)) {
-            let (mut num, mut den) = ([T::ONE; L], [T::ONE; L]);
+            let [mut num, mut den] = [Batch::<T, L>::splat(T::ONE); 2];
             for (k, &root) in roots.iter().take(L).enumerate() {
-                if first + k < candidates.inside { num[k] = root } else { den[k] = root }
+                if first + k < candidates.inside { num.0[k] = root } else { den.0[k] = root }
             }
-            let mut c = unknowns(rows, Batch(num), Batch(den));
+            let mut c = unknowns(rows, num, den);
             if let Some((shift, turned)) = expansion {
                 c[2] = c[2] + c[3].times(shift);
                 if turned {
