@@ -1,6 +1,6 @@
 //! Small fixed-size linear algebra without panic paths or unbounded loops.
 
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use nalgebra::{ArrayStorage, Matrix3, SMatrix, Vector3};
 
 use crate::Real;
 use crate::real::{abs, is_finite, max};
@@ -39,14 +39,18 @@ pub use svd3::{Svd3, svd3};
 #[cfg_attr(not(small), inline(always))]
 #[cfg_attr(small, inline(never))]
 pub(crate) fn product<T: Real>(a: &Matrix3<T>, b: &Matrix3<T>) -> Matrix3<T> {
-    a * b
+    let b = &b.data.0;
+    let column = |j: usize| times(a, &Vector3::from(b[j])).data.0[0];
+    Matrix3::from_data(ArrayStorage([column(0), column(1), column(2)]))
 }
 
 /// `A x`, by a call where code is to be small.
 #[cfg_attr(not(small), inline(always))]
 #[cfg_attr(small, inline(never))]
 pub(crate) fn times<T: Real>(a: &Matrix3<T>, x: &Vector3<T>) -> Vector3<T> {
-    a * x
+    let (a, x) = (&a.data.0, &x.data.0[0]);
+    let row = |i: usize| a[0][i] * x[0] + a[1][i] * x[1] + a[2][i] * x[2];
+    Vector3::new(row(0), row(1), row(2))
 }
 
 /// `A += s a b'`, by a call where code is to be small.

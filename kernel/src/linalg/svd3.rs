@@ -53,14 +53,15 @@ pub struct Svd3<T: Real> {
 /// ```
 #[must_use]
 pub fn svd3<T: Real>(a: &Matrix3<T>) -> Option<Svd3<T>> {
-    let largest = super::largest_magnitude(a.data.0.iter().flatten())?;
+    let largest = super::largest_magnitude(a.data.0.as_flattened().iter())?;
     if largest == T::ZERO {
-        return Some(Svd3 { u: super::identity(), s: Vector3::zeros(), v: super::identity() });
+        let unit = super::identity();
+        return Some(Svd3 { u: unit, s: Vector3::zeros(), v: unit });
     }
     // Columns of A V are made orthogonal; V gathers the rotations.
     let mut columns = [[[T::ZERO; 3]; 2]; 3];
     for k in 0..3 {
-        columns[k] = [over(&a.data.0[k], largest), [T::ZERO; 3]];
+        columns[k][0] = over(&a.data.0[k], largest);
         columns[k][1][k] = T::ONE;
     }
     let [a, b, c] = &mut columns;
@@ -97,7 +98,7 @@ pub fn svd3<T: Real>(a: &Matrix3<T>) -> Option<Svd3<T>> {
     let s1 = min(s1, s0);
     Some(Svd3 {
         u: Matrix3::from_data(ArrayStorage([u0, u1, u2])),
-        s: Vector3::new(s0, s1, min(abs(s2), s1)) * largest,
+        s: scaled(&[s0, s1, min(abs(s2), s1)], largest).into(),
         v: Matrix3::from_data(ArrayStorage([*va, *vb, *vc])),
     })
 }

@@ -143,8 +143,7 @@ impl<T: Real> Sight<T> {
 
     /// Whether the point lies in front of both cameras, or its rays are parallel to within noise, so that its depth says
     /// nothing: `parallel_sq` is the squared sine up to which they are.
-    #[cfg_attr(not(small), inline(always))]
-    #[cfg_attr(small, inline(never))]
+    #[inline(always)]
     pub(crate) fn in_front(&self, parallel_sq: T) -> bool {
         let ([y0, y1, y2], [x0, x1, x2]) = (self.y, self.x);
         // d1 y + e3 = d2 x, in the least-squares sense: both depths times |y x x|^2.

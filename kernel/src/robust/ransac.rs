@@ -384,6 +384,7 @@ impl<'a, T: Real> Search<'a, T> {
         if self.most_agree() { wanted.div_ceil(2) } else { wanted }
     }
 
+    #[cfg_attr(small, inline(never))]
     fn add_up(&mut self) {
         self.spent.residuals = self.counts.residuals.saturating_add(self.refined_residuals);
     }

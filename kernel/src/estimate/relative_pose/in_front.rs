@@ -62,7 +62,7 @@ pub(super) fn pose_in_front<T: Real>(
             sign = depth1;
         }
         if consistent {
-            let t = if sign < T::ZERO { -t } else { t };
+            let t = if sign < T::ZERO { Vector3::new(-t.x, -t.y, -t.z) } else { t };
             // A matrix that is not close to essential gives no rotation.
             let off = abs(rotation.norm_squared() - lit(3.0));
             return (off < lit(0.1)).then_some((rotation, t));

@@ -31,7 +31,7 @@ type Near = [u32; RANGES];
 fn add<T: Real, B: EpipolarBlock<T>>(near: &mut Near, frame: &PoseFrame<T>, block: &B, limit: T) {
     for l in 0..LANES {
         let sight = block.sight(&frame.views, l);
-        if sight.c * sight.c < limit * sight.d && sight.in_front(frame.parallel_sq) {
+        if sight.c * sight.c < limit * sight.d && frame.admits(&sight) {
             let [top, mut bottom] = sight.distance_sq();
             bottom *= lit(FARTHEST_SQ);
             let mut range = 0;

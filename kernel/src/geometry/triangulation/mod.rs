@@ -17,7 +17,6 @@ use nalgebra::{Matrix3, Vector3};
 use super::Pose;
 use super::pose::{rotation_matrix, vector_angle};
 use crate::Real;
-use crate::linalg::times;
 use crate::linalg::vec3::{cross, dot, over};
 use crate::real::{abs, is_finite, lit, max, sqrt};
 
@@ -108,7 +107,8 @@ impl<T: Real> ViewPair<T> {
     #[inline]
     #[must_use]
     pub fn from_parts(r: &Matrix3<T>, t: &Vector3<T>) -> Self {
-        Self { rotation: *r, centre: -times(&r.transpose(), t) }
+        let minus = |k: usize| -dot(&r.data.0[k], &t.data.0[0]);
+        Self { rotation: *r, centre: Vector3::new(minus(0), minus(1), minus(2)) }
     }
 
     /// The centre of view 2 in the frame of view 1, `-R' t`.
