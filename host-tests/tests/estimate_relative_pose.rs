@@ -579,6 +579,32 @@ fn accidental_inliers_are_left_out() {
     }
 }
 
+/// What is too near of a rough pose is looked at again from where it leads: hardly more is left out than from the true pose.
+#[test]
+fn a_rough_pose_leaves_out_no_more() {
+    let camera = scene_camera();
+    let mut options = options();
+    options.max_error_px = 2.0;
+    let mut kept = [0; 2];
+    for_each_case(20, |seed, rng| {
+        let problem = Scene::new(Motion::General, 500).noise_px(1.0).outliers(0.5).generate(seed);
+        let (x1, x2) = problem.pixels::<f64>();
+        let mut rough = problem.pose;
+        rough.translation.vector += rng.direction() * (0.07 * rough.translation.vector.norm());
+        for (kept, start) in kept.iter_mut().zip([problem.pose, rough]) {
+            let mut memory = Memory::new(500);
+            let mut workspace = memory.workspace();
+            refine_relative_pose(&camera, &camera, &x1, &x2, &start, &options, &mut workspace)
+                .unwrap()
+                .unwrap();
+            let inliers = workspace.inliers().iter().zip(&problem.inlier);
+            *kept += inliers.filter(|&(&kept, &inlier)| kept && inlier).count();
+        }
+    });
+    println!("of 5,000 right ones kept from the true pose {}, from a rough one {}", kept[0], kept[1]);
+    assert!(100 * kept[1] > 98 * kept[0], "{kept:?}");
+}
+
 /// A near object that tells most of the translation is kept, though wrong matches seem to lie as near.
 #[test]
 fn a_near_object_is_kept() {

@@ -352,10 +352,10 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
 
     /// The pose that all inliers support, with what lies just beyond the threshold at a falling weight.
     pub(super) fn refine(&self, model: &PoseModel<T>, passes: u32) -> Refined<T> {
-        let seen = self.spread(model);
+        let mut start = self.open(model);
+        let seen = self.spread(&start);
         let support = self.support(&seen);
         let variance = seen.noise * seen.noise;
-        let mut start = self.open(model);
         // Not where hardly one is expected, and not of poses that are only tried.
         let wrong = from_u32::<T>((self.problem.data.count as u32).saturating_sub(seen.count));
         if passes > TWIN_PASSES && wrong * self.accident() > lit(FEW_ACCIDENTS) {
@@ -379,7 +379,11 @@ impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
         let length = sqrt(start.translation.norm_squared());
         if length > T::ZERO {
             start.translation *= T::ONE / length;
-            let refined = self.refine(&start, REFINE_PASSES);
+            let mut refined = self.refine(&start, REFINE_PASSES);
+            // What lies too near of a rough pose may not do so of the one that it leads to.
+            if refined.model.scales.nearest_sq > T::ZERO {
+                refined = self.refine(&refined.model, REFINE_PASSES);
+            }
             let (inliers, spread) = self.mark(&refined, mask);
             if inliers >= 6 {
                 let motion = self.motion(&refined, &spread).0;

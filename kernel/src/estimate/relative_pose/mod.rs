@@ -309,7 +309,8 @@ fn load<T: Real>(
 /// (100 points, 0.5 px of noise).
 ///
 /// # Cost
-/// At most 12 passes over the correspondences, three times as many with a prior.
+/// At most 12 passes over the correspondences, three times as many with a prior. Where accidents are expected, 13 more over 508
+/// of them at the most tell what is too near, and where something is, all of it is done twice.
 ///
 /// # References
 /// P. Sampson, "Fitting conic sections to very scattered data", 1982; A. Beaton, J. Tukey, "The fitting of power series",
