@@ -34,9 +34,9 @@ pub struct Budget {
     /// Minimal problems solved (degenerate samples cost none). Default: no limit.
     pub max_solver_calls: u32,
     /// Residuals evaluated, of one correspondence under one model each. Default: no limit but 4.29e9, where the count
-    /// ends. The search stays within it but for one local optimisation; a hypothesis is looked at where two residuals of
-    /// every correspondence are left (four where hypotheses are polished: a relative pose with a prior), so that less than
-    /// that scores nothing.
+    /// ends. The search stays within it but for one local optimisation and what compares its model with the best. A
+    /// hypothesis is looked at where two residuals of every correspondence are left (one of a relative pose, four with a
+    /// prior, where hypotheses are polished), so that less than that scores nothing.
     pub max_residuals: u32,
 }
 

@@ -58,7 +58,8 @@ pub struct Consensus<M, T> {
 /// rejected, or there are fewer correspondences than a sample takes.
 ///
 /// # Cost
-/// At most the budget; one local optimisation, begun within the budget of residuals, may end beyond it.
+/// At most the budget; one local optimisation, begun within the budget of residuals, may end beyond it, with what compares
+/// its model with the best.
 /// Memory: three models on the stack.
 ///
 /// # References

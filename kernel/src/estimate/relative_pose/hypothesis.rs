@@ -438,7 +438,8 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
         for (a, b) in a.lanes.as_flattened().iter().zip(b.lanes.as_flattened()) {
             both += (a & b) as u32;
         }
-        *residuals = residuals.saturating_add(2 * self.data.count as u32);
+        let seen = core::cmp::min(SAMPLED_BLOCKS * LANES, self.data.count) as u32;
+        *residuals = residuals.saturating_add(2 * seen);
         let most = core::cmp::max(a.count, b.count);
         most.saturating_sub(both) <= most / UNSHARED_ONE_IN + UNSHARED
     }

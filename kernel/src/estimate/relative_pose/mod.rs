@@ -100,7 +100,7 @@ pub type RelativePoseError = TwoViewError;
 /// the fewest inliers that chance does not explain take (13 of 50, 17 of 100), which by the default takes 3 hundredths of a
 /// second for 50 correspondences on a desktop computer, a third for 200: firmware sets a budget, or [`Guide::keep_going`]. Beyond a
 /// budget of residuals at most one refinement (five passes over 256 correspondences at the most, with a prior one, one score of
-/// all, two passes to compare it with the best, and six passes over 32 to try a rotation), and the verdict's passes. A budget of fewer
+/// all, two over 256 to compare it with the best, and six over 32 to try a rotation), and the verdict's passes. A budget of fewer
 /// than n residuals, of 4 n with a prior, scores nothing. At half outliers a prior takes less than a third of the
 /// samples; a contradicted one costs its own search, of as many samples as a fifth of inliers needs, and one more
 /// verdict.
