@@ -85,10 +85,19 @@ pub(super) fn beyond_chance_with<T: Real>(
 /// The chance of a wrong correspondence to lie within `threshold` of an epipolar line by the Sampson error: the area of
 /// the band over that of the rectangle that the points of view 2 fill.
 pub(super) fn line_accident<T: Real, B: EpipolarBlock<T>>(data: BlockSlice<'_, B>, threshold: T) -> T {
-    let (middle, _) = sides(data);
+    band_accident(width(data), threshold)
+}
+
+/// [`line_accident`] where that rectangle's [`width`] is known.
+pub(super) fn band_accident<T: Real>(width: T, threshold: T) -> T {
     // Sampson's error is the distance to the line over sqrt 2 where both lines are alike; the band has two sides.
     let band = lit::<T>(2.0 * core::f64::consts::SQRT_2) * threshold;
-    if middle > band { band / middle } else { T::ONE }
+    if width > band { band / width } else { T::ONE }
+}
+
+/// The shorter side of the rectangle that the points of view 2 fill.
+pub(super) fn width<T: Real, B: EpipolarBlock<T>>(data: BlockSlice<'_, B>) -> T {
+    sides(data).0
 }
 
 /// The chance of a wrong correspondence to lie within `radius` of a transferred point: the area of the disc over that

@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use super::super::chance::line_accident;
+use super::super::chance::band_accident;
 use super::super::degenerate::repeated;
 use super::super::prior::PriorFit;
 use super::hypothesis::PoseProblem;
@@ -60,7 +60,7 @@ impl<'a, T: Real, B: EpipolarBlock<T>, K> AidedProblem<'a, T, B, K> {
     /// None where the prior is too vague to sample by.
     fn new(problem: &PoseProblem<'a, T, B>, variance: T, known: K) -> Option<Self> {
         let wide = problem.threshold + sqrt(variance) * lit(WIDE_SIGMAS);
-        let accident = line_accident(problem.data, wide);
+        let accident = band_accident(problem.width, wide);
         if !(accident < lit(VAGUE)) {
             return None;
         }

@@ -16,7 +16,7 @@ use crate::robust::loss::Loss;
 use crate::robust::{Estimator, Gate, Score, ScoreCounts, Tally};
 use crate::solvers::relpose_5pt;
 
-use super::super::chance::{EXPLAINED_SIGMAS, least_beyond_chance, line_accident};
+use super::super::chance::{EXPLAINED_SIGMAS, band_accident, least_beyond_chance, width};
 use super::super::degenerate::repeated;
 use super::super::stride;
 use super::in_front::pose_in_front;
@@ -31,6 +31,10 @@ pub(super) struct PoseProblem<'a, T: Real, B> {
     pub(super) threshold: T,
     /// Blocks between two that are scored one after the other.
     pub(super) stride: usize,
+    /// The shorter side of the rectangle that the points of view 2 fill, and the chance of a wrong correspondence to lie
+    /// within the threshold of its epipolar line: once for all, for they take a pass.
+    pub(super) width: T,
+    pub(super) line_accident: T,
     /// What is known of the rotation and enters every optimisation, and the variance of a residual that it is weighed
     /// against.
     pub(super) prior: Option<(&'a dyn RotationPrior<T>, T)>,
@@ -73,7 +77,9 @@ impl<'a, T: Real, B: EpipolarBlock<T>> PoseProblem<'a, T, B> {
     pub(super) fn new(data: BlockSlice<'a, B>, scales: Scales<T>, threshold: T) -> Self {
         let sine = threshold * lit(PARALLEL);
         let scales = Scales { parallel_sq: sine * sine, ..scales };
-        Self { data, scales, threshold, stride: stride(data.blocks.len()), prior: None, exchange: None }
+        let (stride, width) = (stride(data.blocks.len()), width(data));
+        let line_accident = band_accident(width, threshold);
+        Self { data, scales, threshold, stride, width, line_accident, prior: None, exchange: None }
     }
 
     /// The normalised points or bearings of a correspondence; none where it is not finite.
@@ -360,7 +366,7 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
     }
 
     fn least_consensus(&self) -> u32 {
-        least_beyond_chance(self.data.count as u32, 5, line_accident(self.data, self.threshold))
+        least_beyond_chance(self.data.count as u32, 5, self.line_accident)
     }
 
     fn generate(&self, sample: &[u32; 5], found: &mut impl FnMut(&PoseModel<T>)) -> bool {

@@ -4,7 +4,7 @@ use core::cell::Cell;
 
 use nalgebra::Matrix3;
 
-use super::super::chance::{EXPLAINED_SIGMAS, beyond_chance, line_accident};
+use super::super::chance::{EXPLAINED_SIGMAS, beyond_chance};
 use super::super::degenerate::{few_distinct, list, on_a_line};
 use super::super::prior::PriorFit;
 use super::LEAST_INLIERS;
@@ -122,9 +122,8 @@ const LEAST_LINE: usize = 15;
 
 impl<T: Real, B: EpipolarBlock<T>> Judge<'_, '_, T, B> {
     /// The chance of a wrong correspondence to be an inlier.
-    #[cfg_attr(small, inline(never))]
     fn accident(&self) -> T {
-        line_accident(self.problem.data, self.problem.threshold)
+        self.problem.line_accident
     }
 
     /// Writes verdict and noise, in the blocks' unit, of what a search found (in place, for a verdict is large), how a prior
