@@ -52,6 +52,8 @@ pub enum Shape {
     Line,
     /// This many distinct points, repeated; noise, if any, is drawn for each repetition.
     Repeated(usize),
+    /// This many points at depths 2 to 3, the others at 20 to 60.
+    NearObject(usize),
 }
 
 /// A recipe of two-view problems; [`Scene::generate`] cooks it for a seed.
@@ -125,6 +127,8 @@ impl Scene {
                 Shape::Volume | Shape::Repeated(_) => ray * rng.range(near, far),
                 Shape::Plane => ray * (plane.1 / plane.0.dot(&ray)),
                 Shape::Line => ends[0] + (ends[1] - ends[0]) * rng.unit(),
+                Shape::NearObject(near) if points.len() < near => ray * rng.range(2.0, 3.0),
+                Shape::NearObject(_) => ray * rng.range(20.0, 60.0),
             };
             let (depth1, seen2) = (point.z, pose * epipole::nalgebra::Point3::from(point));
             let visible = match self.motion {

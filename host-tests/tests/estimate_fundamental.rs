@@ -95,6 +95,16 @@ in_both_scalars! {
         }
     }
 
+    /// A near object that tells most of the epipoles takes part, though wrong matches seem to lie as near.
+    fn a_near_object_is_kept<T>() {
+        share_of(60, |seed, _| {
+            let scene = Scene::new(Motion::General, N).shape(Shape::NearObject(30)).noise_px(1.0).outliers(0.6);
+            let scene = scene.generate(seed);
+            let (x1, x2) = scene.pixels::<T>();
+            run(&x1, &x2, &options(2.0)).fundamental().is_some_and(|f| distance(&f.0, &scene) < 1.0)
+        }).assert_at_least(0.9);
+    }
+
     fn views_exchanged_and_pixels_rescaled<T>() {
         for_each_case(10, |seed, _| {
             let scene = scene(Motion::General, 0.5, 0.3, seed);

@@ -611,30 +611,22 @@ fn a_near_object_is_kept() {
     let camera = scene_camera();
     let mut options = options();
     options.max_error_px = 2.0;
-    let mut kept = 0;
-    for_each_case(30, |seed, rng| {
-        // One right match in seven at two baselines, the others at 20 to 60; three in five are wrong.
-        let truth = Scene::new(Motion::General, 8).generate(seed).pose;
-        let length = truth.translation.vector.norm();
-        let (mut x1, mut x2) = (Vec::new(), Vec::new());
-        let pixel = |rng: &mut Rng| Vector2::new(rng.range(0.0, 640.0), rng.range(0.0, 480.0));
-        while x1.len() < 400 {
-            let right = x1.len() < 100;
-            let near = x1.len() < 10;
-            let p = pixel(rng);
-            let depth = length * if near { rng.range(2.0, 2.5) } else { rng.range(20.0, 60.0) };
-            let point = camera.unproject(&p).unwrap();
-            let seen = camera.project(&(truth * Point3::from(point * (depth / point.z))).coords);
-            let noise = |rng: &mut Rng| Vector2::new(rng.normal(), rng.normal());
-            let Some(q) = seen else { continue };
-            x1.push(p + noise(rng));
-            x2.push(if right { q + noise(rng) } else { pixel(rng) });
-        }
+    let [mut all, mut kept] = [0; 2];
+    for_each_case(30, |seed, _| {
+        let scene =
+            Scene::new(Motion::General, 400).shape(Shape::NearObject(40)).noise_px(1.0).outliers(0.75);
+        let problem = scene.generate(seed);
+        let (x1, x2) = problem.pixels::<f64>();
         let mut memory = Memory::new(400);
         let mut workspace = memory.workspace();
-        refine_relative_pose(&camera, &camera, &x1, &x2, &truth, &options, &mut workspace).unwrap().unwrap();
-        kept += workspace.inliers()[..10].iter().filter(|&&inlier| inlier).count();
+        refine_relative_pose(&camera, &camera, &x1, &x2, &problem.pose, &options, &mut workspace)
+            .unwrap()
+            .unwrap();
+        for (&kept_here, &inlier) in workspace.inliers().iter().zip(&problem.inlier).take(40) {
+            all += inlier as u32;
+            kept += (kept_here && inlier) as u32;
+        }
     });
-    println!("of 300 near right ones {kept} kept");
-    assert!(kept > 270, "{kept}");
+    println!("of {all} near right ones {kept} kept");
+    assert!(10 * kept > 9 * all, "{kept} of {all}");
 }

@@ -18,6 +18,7 @@ mod frame;
 mod fundamental;
 mod homography;
 mod load;
+mod near;
 mod prior;
 mod relative_pose;
 mod scatter;

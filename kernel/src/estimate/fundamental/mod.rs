@@ -75,8 +75,8 @@ impl<T: Real> Default for FundamentalOptions<T> {
 /// # Accuracy
 /// That of the maximum-likelihood estimate from the inliers to within a few percent. Wrong correspondences that agree by
 /// accident seem to lie far off the scene, where they would move the matrix as hundreds of others do: the last refinement
-/// leaves out what lies farther off the plane that fits the inliers best than an edge beyond which they are too many, at
-/// most a quarter (they stay inliers of the mask). Coordinates are counted from the
+/// leaves out what lies farther off the plane that fits the inliers best than a limit, where the epipoles are more certain
+/// without, at most a quarter (they stay inliers of the mask). Coordinates are counted from the
 /// middle of the points in units of their spread, so that `f32` answers as `f64` does.
 ///
 /// # Cost

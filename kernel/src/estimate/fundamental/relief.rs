@@ -1,11 +1,11 @@
-//! Inliers of a fundamental matrix that are too near to be right: what agrees by accident is anywhere along its epipolar
-//! lines, so most of it seems to be much nearer than the scene, and there it has leverage as nothing right has.
+//! Inliers of a fundamental matrix that are too near to be right, where that is measured off the plane that fits them best.
 
 use nalgebra::{Matrix3, SVector, Vector3};
 
 use super::hypothesis::EpipolarProblem;
 use crate::Real;
 use crate::estimate::chance::for_each_other;
+use crate::estimate::near::last_range;
 use crate::geometry::pose::skew;
 use crate::linalg::vec3::{cross, dot};
 use crate::linalg::{LANES, add_outer, damped_step};
@@ -16,16 +16,15 @@ use crate::refine::lm::{EpipolarModel, Manifold, Row};
 
 /// Passes that fit the plane: least squares first, then with Cauchy's weights.
 const PLANE_PASSES: u32 = 5;
-/// Edges between near and far are tried from this share of the mean square of the inliers' relief, each twice the last.
-const FIRST_EDGE: f64 = 1.0 / 16.0;
-const EDGES: usize = 22;
+/// Squared relief of the farthest limit in mean squares of the inliers', and how many ranges there are, each but the last up
+/// to twice the relief of the one before.
+const FIRST_LIMIT: f64 = 1.0 / 16.0;
+const RANGES: usize = 12;
 /// Blocks that the plane is fitted to and whose accidents are counted, about so many and up to twice; partners of each.
 const BLOCKS: usize = 64;
 const OTHERS: usize = 6;
-/// What a right one that is left out costs, in accidents left out.
-const COST: f64 = 0.1;
-/// At most one in so many inliers is left out.
-const LEFT_OUT: u32 = 4;
+/// Accidents among those that agree, for each that mispaired ones let expect: the matrix was chosen for how many agree.
+const SELECTED: u32 = 2;
 
 /// How far correspondences lie off a plane, as inverse depths of one view.
 ///
@@ -114,7 +113,7 @@ impl<T: Real> Relief<T> {
         self.squared(block, lane) <= self.limit
     }
 
-    /// Of the inliers within `support` of a model those that are to stay; none where no edge gains.
+    /// Of the inliers within `support` of a model those that are to stay; none where all are.
     pub(super) fn of(
         problem: &EpipolarProblem<'_, T>,
         model: &FundamentalModel<T>,
@@ -140,46 +139,36 @@ impl<T: Real> Relief<T> {
         let side1 = Side::fitted(&model.matrix, &model.epipole2, &inliers)?;
         let side2 = Side::fitted(&model.matrix.transpose(), &model.epipole1, &exchanged)?;
         let mut relief = Self { sides: [side1, side2], limit: T::MAX };
-        // How many lie beyond each edge; the zeroth counts all.
-        let count = |block: &PlaneBlock<T>, beyond: &mut [u32; EDGES]| {
+        let count = |block: &PlaneBlock<T>, near: &mut [u32; RANGES]| {
             for l in 0..LANES {
                 if FundamentalModel::inside(&frame, block, l, within).is_some() {
                     let squared = relief.squared(block, l);
-                    let mut edge = lit(FIRST_EDGE);
-                    for entry in beyond.iter_mut() {
-                        *entry += 1;
-                        if squared <= edge {
-                            break;
-                        }
-                        edge *= T::TWO;
+                    let (mut range, mut limit) = (0, lit(FIRST_LIMIT));
+                    while range < RANGES - 1 && squared > limit {
+                        range += 1;
+                        limit *= lit(4.0);
+                    }
+                    if let Some(count) = near.get_mut(range) {
+                        *count += 1;
                     }
                 }
             }
         };
-        let (mut observed, mut accidents) = ([0u32; EDGES], [0u32; EDGES]);
+        let (mut agreeing, mut accidents) = ([0u32; RANGES], [0u32; RANGES]);
         for block in full {
-            count(block, &mut observed);
+            count(block, &mut agreeing);
         }
         let seen = for_each_other(data, OTHERS, every, |block, other| {
             // Both ways, so that views exchanged give the same.
             count(&block.mispaired(other), &mut accidents);
             count(&other.mispaired(block), &mut accidents);
         });
-        let seen = 2 * seen;
         // As many accidents as wrong ones have: all but the inliers, and the accidents among those.
-        let outside = from_u32::<T>(((full.len() * LANES) as u32).saturating_sub(observed[0]));
-        let share = outside / from_u32(core::cmp::max(seen.saturating_sub(accidents[0]), 1));
-        let (mut best, mut limit) = (T::ZERO, None);
-        let mut edge = lit(FIRST_EDGE);
-        for (&all, &accidental) in observed.iter().zip(&accidents).skip(1) {
-            let wrong = from_u32::<T>(accidental) * share;
-            let gain = wrong - (from_u32::<T>(all) - wrong) * lit(COST);
-            if gain > best && LEFT_OUT * all <= observed[0] {
-                (best, limit) = (gain, Some(edge));
-            }
-            edge *= T::TWO;
-        }
-        relief.limit = limit?;
+        let outside = ((full.len() * LANES) as u32).saturating_sub(agreeing.iter().sum());
+        let apart = (2 * seen).saturating_sub(accidents.iter().sum());
+        let share = from_u32::<T>(SELECTED * outside) / from_u32(core::cmp::max(apart, 1));
+        let last = last_range(&agreeing, &accidents, share)?;
+        relief.limit = (0..last).fold(lit(FIRST_LIMIT), |limit, _| limit * lit(4.0));
         Some(relief)
     }
 }
