@@ -6,6 +6,7 @@ use super::chance::{EXPLAINED_SIGMAS, beyond_chance, line_accident};
 use super::stride;
 use crate::Real;
 use crate::linalg::LANES;
+use crate::linalg::vec3::apart_sq;
 use crate::real::{abs, lit, min, sqrt};
 use crate::refine::blocks::{BlockSlice, EpipolarBlock};
 use crate::robust::Sampler;
@@ -29,7 +30,7 @@ pub(super) fn repeated<T: Real, const S: usize>(points: &[Vector3<T>; S], distan
     for i in 1..S {
         for j in 0..i {
             // Written so that a NaN counts as repeated.
-            if !((points[i] - points[j]).norm_squared() > limit) {
+            if !(apart_sq(&points[i].data.0[0], &points[j].data.0[0]) > limit) {
                 return true;
             }
         }

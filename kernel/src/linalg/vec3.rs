@@ -13,6 +13,13 @@ pub(crate) fn cross<T: Real>(a: &[T; 3], b: &[T; 3]) -> [T; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+/// `|a - b|^2`
+#[cfg_attr(not(small), inline(always))]
+pub(crate) fn apart_sq<T: Real>(a: &[T; 3], b: &[T; 3]) -> T {
+    let d = less(a, b, T::ONE);
+    dot(&d, &d)
+}
+
 /// `s a`
 #[cfg_attr(not(small), inline(always))]
 pub(crate) fn scaled<T: Real>(a: &[T; 3], s: T) -> [T; 3] {

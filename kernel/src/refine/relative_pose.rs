@@ -7,7 +7,7 @@ use super::lm::{EpipolarModel, Manifold, NormalEquations, Row};
 use crate::Real;
 use crate::geometry::Pose;
 use crate::geometry::pose::{from_parts, tangent_basis};
-use crate::linalg::vec3::{dot, less, scaled};
+use crate::linalg::vec3::{apart_sq, dot, scaled};
 use crate::linalg::{cross, product};
 use crate::real::sqrt;
 
@@ -116,15 +116,11 @@ impl<T: Real> PoseModel<T> {
     /// Squared distance of the rotation (the angle's square, of a small angle) and of the translation.
     #[cfg_attr(small, inline(never))]
     pub(crate) fn distance_sq(&self, other: &Self) -> T {
-        let apart = |a: &[T; 3], b: &[T; 3]| {
-            let d = less(a, b, T::ONE);
-            dot(&d, &d)
-        };
         let mut turn = T::ZERO;
         for (a, b) in self.rotation.data.0.iter().zip(&other.rotation.data.0) {
-            turn += apart(a, b);
+            turn += apart_sq(a, b);
         }
-        turn * T::HALF + apart(&self.translation.data.0[0], &other.translation.data.0[0])
+        turn * T::HALF + apart_sq(&self.translation.data.0[0], &other.translation.data.0[0])
     }
 
     /// `E = [t]x R`, column by column.

@@ -403,7 +403,8 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
             if let Some(block) = blocks.get(at) {
                 let squared = self.squared(block, &view);
                 let filled = core::cmp::min(self.data.count.saturating_sub(at * LANES), LANES);
-                if filled == LANES {
+                // Not two loops where code is to be small.
+                if filled == LANES && !cfg!(small) {
                     tally.add(&squared);
                 } else {
                     tally.add_first(&squared, filled);
