@@ -16,7 +16,6 @@ const LEFT_OUT: u32 = 4;
 /// do. `agreeing` correspondences of each range, among them `share` times as many accidents as given. It is the range
 /// after which the translation has the least variance, where a correspondence tells of it as the square of its inverse
 /// depth.
-#[cfg_attr(small, inline(never))]
 pub(super) fn last_range<T: Real>(agreeing: &[u32], accidents: &[u32], share: T) -> Option<usize> {
     let all = agreeing.iter().sum::<u32>();
     let (mut last, mut least) = (None, T::MAX);
