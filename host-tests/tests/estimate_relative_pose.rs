@@ -41,6 +41,24 @@ fn recovers_general_motion<T: Real>() {
     }
 }
 
+/// Three hundred samples drawn evenly hold one of right matches only in one of ten such scenes.
+#[test]
+fn near_correspondences_are_sooner_right() {
+    for motion in [Motion::General, Motion::Forward] {
+        let share = share_of(40, |seed, _| {
+            let problem = Scene::new(motion, 200).noise_px(0.5).outliers(0.8).generate(seed);
+            let mut options = options::<f64>();
+            options.ransac.budget.max_iterations = 300;
+            let (estimate, _) = estimate_scene(&problem, &options).unwrap();
+            let RelativePoseVerdict::General(found) = estimate.verdict else { return false };
+            let (r, t) = pose_error(&found.pose, &problem.pose);
+            r < DEGREE && t < 10.0 * DEGREE
+        });
+        println!("{motion:?}: {:.2} found", share.value());
+        assert!(share.value() >= 0.5, "{motion:?}: {share:?}");
+    }
+}
+
 /// The right verdict on every seed, never a general pose.
 fn degenerate_scenes<T: Real>() {
     type Right<T> = fn(&RelativePoseVerdict<T>) -> bool;

@@ -92,6 +92,10 @@ impl<T: Real> Estimator<T, 2> for Location<T> {
         is_finite(a) && is_finite(b)
     }
 
+    fn apart(&self, a: u32, b: u32) -> Option<T> {
+        Some(*self.0.get(a as usize)? - *self.0.get(b as usize)?)
+    }
+
     fn polish(&self, model: &T, _bound: T, counts: &mut ScoreCounts) -> Option<T> {
         counts.residuals += 1;
         self.0.first().map(|x| *model + (*x - *model) * lit::<T>(1e-3))

@@ -229,9 +229,10 @@ pub struct RansacReport<T> {
     /// The model's truncated squared error: the sum over all correspondences of min(r^2 / threshold^2, 1).
     pub cost: T,
     /// Probability that no sample of inliers only was drawn, given the inliers found: the hypergeometric chance of
-    /// one draw to the power of the iterations. 1 without a model. Ranked samples count as if they were uniform: where
-    /// the scores tell inliers at all, the true probability is smaller, for those samples hold inliers more often;
-    /// where they mislead, every other sample is uniform, and its square root bounds it.
+    /// one draw to the power of the iterations. 1 without a model. Ranked samples and those of near correspondences count as if
+    /// they were uniform: where scores tell inliers at all, and inliers move as their neighbours do, the true probability
+    /// is smaller, for those samples hold inliers more often; where they mislead, every other sample is uniform, and its
+    /// square root bounds it (every fourth and the fourth root, with scores and near correspondences both).
     pub miss_probability: T,
     /// Without consensus: a larger share of inliers than this would have been sampled, with the confidence asked.
     pub excluded_inlier_ratio: T,

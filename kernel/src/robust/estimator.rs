@@ -58,6 +58,12 @@ pub trait Estimator<T: Real, const S: usize> {
     /// The model after local optimisation on its inliers; none where that failed. Adds the residuals evaluated.
     fn refine(&self, model: &Self::Model, residuals: &mut u32) -> Option<Self::Model>;
 
+    /// How far apart two correspondences are, in any unit, where near ones are right together more often than others: then
+    /// samples of near ones are sooner of right ones only, and every other one is. None where that is not so.
+    fn apart(&self, _a: u32, _b: u32) -> Option<T> {
+        None
+    }
+
     /// True where a sample is not worth its model, because it would lead to `best`, the best model so far, again.
     fn repeats(&self, _sample: &[u32; S], _best: &Self::Model) -> bool {
         false

@@ -27,6 +27,9 @@ const RIVAL: f64 = 0.1;
 /// correspondences.
 const BRIEF: u32 = 128;
 
+/// So many samples of a run are not of near correspondences.
+const UNIFORM: u32 = 32;
+
 /// What a run found, and how it went.
 #[derive(Clone, Copy, Debug)]
 #[must_use]
@@ -47,6 +50,9 @@ pub struct Consensus<M, T> {
 /// correspondences; half as many where most agree with the best), so many times as many samples, and as many again twice,
 /// are asked for. A run that has found less than a consensus of any use ([`Estimator::least_consensus`]) ends once samples enough
 /// for one have been drawn. With an order, ranked and uniform samples alternate: the best ranked ones may lie close together.
+/// After 32 samples half of the uniform ones are of near correspondences, where the estimator tells distances
+/// ([`Estimator::apart`]): those are right together more often. They count as all others, so that where near ones are wrong together the
+/// confidence is that of half as many samples.
 ///
 /// # Input
 /// `order` maps the ranks of ranked sampling to correspondences; without it samples are uniform. `least_inliers` is
@@ -66,6 +72,8 @@ pub struct Consensus<M, T> {
 /// M. Fischler, R. Bolles, "Random sample consensus", Communications of the ACM 24, 1981.
 /// O. Chum, J. Matas, J. Kittler, "Locally optimized RANSAC", DAGM 2003. Here a hypothesis is optimised where it comes
 /// near the best minimal model, not only where it beats it.
+/// D. Myatt, P. Torr, S. Nasuto, J. Bishop, R. Craddock, "NAPSAC: high noise, high dimensional robust estimation", BMVC 2002
+/// (samples of near points; here the nearest of a few drawn from all, every other time).
 ///
 /// # Examples
 /// A line through points, some of them wrong:
@@ -134,6 +142,9 @@ pub fn ransac<T: Real, E: Estimator<T, S>, const S: usize>(
     while search.next(order, &mut sample, &mut keep_going) {
         if search.spent.iterations == LONG {
             search.ask_for(estimator.least_consensus());
+        }
+        if search.gathers(order.is_some()) {
+            search.sampler.gather(search.spent.iterations, &mut sample, |a, b| estimator.apart(a, b));
         }
         if best.as_ref().is_some_and(|(model, _)| estimator.repeats(&sample, model)) {
             continue;
@@ -338,6 +349,13 @@ impl<'a, T: Real> Search<'a, T> {
             }
         }
         true
+    }
+
+    /// Whether this sample is to be of near correspondences: every other one of those that are not ranked, after a few. A model
+    /// is the better the farther apart its sample is, and where most correspondences are right a few are enough.
+    fn gathers(&self, ranked: bool) -> bool {
+        let every = if ranked { 4 } else { 2 };
+        self.spent.iterations > UNIFORM && self.spent.iterations.is_multiple_of(every)
     }
 
     /// Less than such a consensus is of no use.

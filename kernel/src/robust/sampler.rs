@@ -51,6 +51,9 @@ struct Growth<T> {
     until: T,
 }
 
+/// A gathered sample is one correspondence and the nearest of so many others, at most of one in so many.
+const OTHERS: u32 = 16;
+const OTHERS_ONE_IN: u32 = 4;
 /// After so many samples ranked sampling has become uniform sampling (`T_N` of Chum and Matas).
 const GROWTH_SAMPLES: f64 = 200_000.0;
 
@@ -122,6 +125,38 @@ impl<T: Real> Sampler<T> {
         let seed = (self.seed[1] as u64) << 32 | self.seed[0] as u64;
         choose(mix(seed, iteration), pool, newest, chosen);
         true
+    }
+
+    /// In place of a sample one of its members and those nearest to that of some others; it stays as it is where `apart` tells
+    /// no distances, or where there are too few to choose from.
+    pub(super) fn gather<const S: usize>(
+        &self,
+        iteration: u32,
+        sample: &mut [u32; S],
+        apart: impl Fn(u32, u32) -> Option<T>,
+    ) {
+        let seed = (self.seed[1] as u64) << 32 | self.seed[0] as u64;
+        // Not the words that `choose` takes.
+        let key = mix(!seed, iteration);
+        let below = |count: u32, k: u32| (((mix(key, k) >> 32) * count as u64) >> 32) as u32;
+        let Some(&first) = sample.get(below(S as u32, 0) as usize) else { return };
+        let mut nearest = [(T::MAX, first); S];
+        for k in 1..=core::cmp::min(self.count / OTHERS_ONE_IN, OTHERS) {
+            let other = below(self.count, k);
+            if nearest.iter().any(|&(_, taken)| taken == other) {
+                continue;
+            }
+            let Some(distance) = apart(first, other) else { return };
+            let mut entry = (distance, other);
+            for near in nearest.iter_mut().skip(1) {
+                if entry.0 < near.0 {
+                    core::mem::swap(near, &mut entry);
+                }
+            }
+        }
+        if nearest.iter().skip(1).all(|near| near.0 < T::MAX) {
+            *sample = nearest.map(|near| near.1);
+        }
     }
 }
 
@@ -211,6 +246,27 @@ mod tests {
             largest = largest.max(sample[4]);
         }
         assert_eq!(largest, 199);
+    }
+
+    #[test]
+    fn gathered_samples_are_of_near_numbers() {
+        let mut sampler = Sampler::<f32>::uniform(1, 1000);
+        let (mut drawn, mut gathered) = (0, 0);
+        for i in 0..1000 {
+            let uniform: [u32; 5] = sampler.sample(i).unwrap();
+            let mut sample = uniform;
+            sampler.gather(i, &mut sample, |a, b| Some(a.abs_diff(b) as f32));
+            sample.sort_unstable();
+            assert!(sample.windows(2).all(|w| w[0] < w[1]) && sample[4] < 1000);
+            assert!(uniform.iter().any(|k| sample.contains(k)));
+            drawn += uniform[4] - uniform[0];
+            gathered += sample[4] - sample[0];
+            let mut same = uniform;
+            sampler.gather(i, &mut same, |_, _| None);
+            assert_eq!(same, uniform);
+        }
+        // The widths of five of a thousand and of the nearest four of sixteen.
+        assert!((640_000..690_000).contains(&drawn) && gathered < drawn / 2, "{drawn} {gathered}");
     }
 
     #[test]

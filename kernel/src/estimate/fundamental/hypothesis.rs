@@ -6,6 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::relief::{Admitting, Relief};
 use crate::Real;
 use crate::estimate::chance::{least_beyond_chance, line_accident};
+use crate::estimate::near::apart;
 use crate::estimate::stride;
 use crate::geometry::pose::skew;
 use crate::linalg::{LANES, Lanes};
@@ -143,6 +144,10 @@ impl<T: Real> Estimator<T, 7> for EpipolarProblem<'_, T> {
 
     fn least_consensus(&self) -> u32 {
         least_beyond_chance(self.data.count as u32, 7, line_accident(self.data, self.threshold))
+    }
+
+    fn apart(&self, a: u32, b: u32) -> Option<T> {
+        Some(apart(&self.points(a)?, &self.points(b)?))
     }
 
     fn generate(&self, sample: &[u32; 7], found: &mut impl FnMut(&FundamentalModel<T>)) -> bool {

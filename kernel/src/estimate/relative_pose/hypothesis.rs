@@ -18,6 +18,7 @@ use crate::solvers::relpose_5pt;
 
 use super::super::chance::{EXPLAINED_SIGMAS, band_accident, least_beyond_chance, width};
 use super::super::degenerate::repeated;
+use super::super::near::apart;
 use super::super::stride;
 use super::in_front::pose_in_front;
 use super::prior::RotationPrior;
@@ -367,6 +368,11 @@ impl<T: Real, B: EpipolarBlock<T>> Estimator<T, 5> for PoseProblem<'_, T, B> {
 
     fn least_consensus(&self) -> u32 {
         least_beyond_chance(self.data.count as u32, 5, self.line_accident)
+    }
+
+    #[cfg_attr(small, inline(never))]
+    fn apart(&self, a: u32, b: u32) -> Option<T> {
+        Some(apart(&self.directions(a)?, &self.directions(b)?))
     }
 
     fn generate(&self, sample: &[u32; 5], found: &mut impl FnMut(&PoseModel<T>)) -> bool {
