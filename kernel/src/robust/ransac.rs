@@ -51,8 +51,8 @@ pub struct Consensus<M, T> {
 /// are asked for. A run that has found less than a consensus of any use ([`Estimator::least_consensus`]) ends once samples enough
 /// for one have been drawn. With an order, ranked and uniform samples alternate: the best ranked ones may lie close together.
 /// After 32 samples half of the uniform ones are of near correspondences, where the estimator tells distances
-/// ([`Estimator::apart`]): those are right together more often. They count as all others, so that where near ones are wrong together the
-/// confidence is that of half as many samples.
+/// ([`Estimator::apart`]): those are right together more often. They count as all others do, so that where near ones are
+/// wrong together the confidence is that of half as many samples.
 ///
 /// # Input
 /// `order` maps the ranks of ranked sampling to correspondences; without it samples are uniform. `least_inliers` is
