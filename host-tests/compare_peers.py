@@ -32,7 +32,6 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 WIDTH, HEIGHT, FOCAL, CX, CY = 1241, 376, 718.0, 620.5, 188.0
 THRESHOLDS = {"homography": (3, 5, 10), "absolute-pose": (0.5, 1, 5)}
 MAX_ERROR_PX = {"homography": 4.0, "absolute-pose": 3.0}
-MAX_ITERATIONS = 10_000
 
 
 # Problems: dictionaries of a, b (pixels, or points and pixels), k1, k2 (fx fy cx cy), R, t or H, size.
@@ -206,7 +205,7 @@ def auc(errors, limit):
 # The libraries: name -> f(problem, threshold, confidence), a pose (R, t), a matrix or None.
 
 
-def ours(task):
+def ours(task, iterations):
     subprocess.run(["cargo", "build", "--release", "--quiet", "-p", "epipole-peers"], cwd=ROOT, check=True)
     target = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release"
     name = {"darwin": "libepipole_peers.dylib", "win32": "epipole_peers.dll"}.get(sys.platform, "libepipole_peers.so")
@@ -230,7 +229,7 @@ def ours(task):
             arrays = [np.ascontiguousarray(v, real) for v in ({**d, "b": b}[first], {**d, "b": b}[second], d["k1"])]
             out = np.zeros(length, real)
             x, y, k = (v.ctypes.data for v in arrays)
-            n = function(x, y, len(arrays[0]), k, threshold, confidence, MAX_ITERATIONS, 1, out.ctypes.data)
+            n = function(x, y, len(arrays[0]), k, threshold, confidence, iterations, 1, out.ctypes.data)
             if n < 0:
                 return None
             out = out.astype(float)
@@ -240,7 +239,7 @@ def ours(task):
     return peers
 
 
-def opencv(task):
+def opencv(task, _):
     import cv2
 
     cv2.setNumThreads(1)
@@ -281,7 +280,7 @@ def opencv(task):
     return {"OpenCV RANSAC": make(ransac), "OpenCV USAC_MAGSAC": make(cv2.USAC_MAGSAC)}
 
 
-def poselib(task):
+def poselib(task, iterations):
     import poselib as p
 
     def camera(k):
@@ -289,7 +288,7 @@ def poselib(task):
 
     def options(threshold, confidence, minimum):
         limit = "max_reproj_error" if task in MAX_ERROR_PX else "max_epipolar_error"
-        steps = {"min_iterations": minimum, "max_iterations": MAX_ITERATIONS}
+        steps = {"min_iterations": minimum, "max_iterations": iterations}
         return {limit: threshold, "success_prob": confidence, **steps}
 
     def call(minimum):
@@ -309,7 +308,7 @@ def poselib(task):
     return {"PoseLib": call(1000), "PoseLib min20": call(20)}
 
 
-def colmap(task):
+def colmap(task, _):
     import pycolmap as c
 
     def camera(k):
@@ -351,6 +350,7 @@ def main():
     parser.add_argument("--max-corr", type=int, help="use only the best N correspondences of a file")
     parser.add_argument("--threshold", type=float, help="largest error of an inlier, pixels (default 2; homography 4, absolute-pose 3)")
     parser.add_argument("--confidence", type=float, default=0.999)
+    parser.add_argument("--max-iterations", type=int, default=10_000, help="of ours and of PoseLib (default 10000)")
     parser.add_argument("--seed", type=int, default=1)
     a = parser.parse_args()
 
@@ -371,10 +371,10 @@ def main():
             for share in a.outliers
         }
 
-    peers = ours(a.task)
+    peers = ours(a.task, a.max_iterations)
     for library, make in (("poselib", poselib), ("opencv-python-headless", opencv), ("pycolmap", colmap)):
         try:
-            peers.update(make(a.task))
+            peers.update(make(a.task, a.max_iterations))
         except ImportError:
             print(f"{library} is not installed: left out", file=sys.stderr)
 
