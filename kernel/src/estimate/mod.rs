@@ -19,6 +19,7 @@ mod fundamental;
 mod homography;
 mod load;
 mod near;
+mod neighbours;
 mod prior;
 mod relative_pose;
 mod scatter;

@@ -2,21 +2,8 @@
 //! seem to lie much nearer than the scene, for along its epipolar line a wrong match may be anywhere, and a residual of
 //! theirs moves the model as hundreds of others do.
 
-use nalgebra::Vector3;
-
 use crate::Real;
 use crate::real::{from_u32, lit, max, sqrt};
-
-/// The square of how differently two correspondences move counts so many times that of how far apart they lie in view 1.
-const MOTION: f64 = 10.0;
-
-/// How far two correspondences are apart, so that near ones are right together more often than others: wrong ones seldom move as
-/// their neighbours do.
-pub(super) fn apart<T: Real>(a: &(Vector3<T>, Vector3<T>), b: &(Vector3<T>, Vector3<T>)) -> T {
-    let place = a.0 - b.0;
-    let motion = a.1 - b.1 - place;
-    place.dot(&place) + motion.dot(&motion) * lit(MOTION)
-}
 
 /// What an accident adds to the variance over what a right correspondence as near does.
 const HARM: f64 = 5.0;

@@ -59,7 +59,8 @@ pub trait Estimator<T: Real, const S: usize> {
     fn refine(&self, model: &Self::Model, residuals: &mut u32) -> Option<Self::Model>;
 
     /// How far apart two correspondences are, in any unit, where near ones are right together more often than others: then
-    /// samples of near ones are sooner of right ones only, and every other one is. None where that is not so.
+    /// samples of near ones are sooner of right ones only, and every other one is. None where that is not so. Asked 16 times a
+    /// sample at the most.
     fn apart(&self, _a: u32, _b: u32) -> Option<T> {
         None
     }

@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::relief::{Admitting, Relief};
 use crate::Real;
 use crate::estimate::chance::{least_beyond_chance, line_accident};
-use crate::estimate::near::apart;
+use crate::estimate::neighbours::apart;
 use crate::estimate::stride;
 use crate::geometry::pose::skew;
 use crate::linalg::{LANES, Lanes};

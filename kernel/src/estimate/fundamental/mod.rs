@@ -84,7 +84,8 @@ impl<T: Real> Default for FundamentalOptions<T> {
 /// needs for the inliers found, or for the fewest that chance does not explain, and one local optimisation of at most 13
 /// passes over the correspondences for each that leads; at most 40 in the end and as many again where a plane holds most
 /// inliers, and for each of those two pairs of passes that look for accidents the inliers ten times and six mispaired lists.
-/// After 32 samples every other one is of near correspondences, which are right together more often.
+/// After 32 samples every other one (every fourth where there are scores) is of near correspondences, which are right
+/// together more often.
 ///
 /// # References
 /// O. Chum, T. Werner, J. Matas, "Two-view geometry estimation unaffected by a dominant plane", CVPR 2005, and

@@ -24,7 +24,7 @@ const RANGES: usize = 12;
 const BLOCKS: usize = 64;
 const OTHERS: usize = 6;
 /// Accidents among those that agree, for each that mispaired ones let expect: the matrix was chosen for how many agree.
-const SELECTED: u32 = 2;
+const SELECTED: f64 = 2.0;
 
 /// How far correspondences lie off a plane, as inverse depths of one view.
 ///
@@ -166,7 +166,7 @@ impl<T: Real> Relief<T> {
         // As many accidents as wrong ones have: all but the inliers, and the accidents among those.
         let outside = ((full.len() * LANES) as u32).saturating_sub(agreeing.iter().sum());
         let apart = (2 * seen).saturating_sub(accidents.iter().sum());
-        let share = from_u32::<T>(SELECTED * outside) / from_u32(core::cmp::max(apart, 1));
+        let share = from_u32::<T>(outside) * lit(SELECTED) / from_u32(core::cmp::max(apart, 1));
         let last = last_range(&agreeing, &accidents, share)?;
         relief.limit = (0..last).fold(lit(FIRST_LIMIT), |limit, _| limit * lit(4.0));
         Some(relief)

@@ -18,7 +18,7 @@ use crate::solvers::relpose_5pt;
 
 use super::super::chance::{EXPLAINED_SIGMAS, band_accident, least_beyond_chance, width};
 use super::super::degenerate::repeated;
-use super::super::near::apart;
+use super::super::neighbours::apart;
 use super::super::stride;
 use super::in_front::pose_in_front;
 use super::prior::RotationPrior;

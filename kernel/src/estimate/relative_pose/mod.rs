@@ -104,8 +104,8 @@ pub type RelativePoseError = TwoViewError;
 /// than n residuals, of 4 n with a prior, scores nothing. At half outliers a prior takes less than a third of the
 /// samples; a contradicted one costs its own search, of as many samples as a fifth of inliers needs, and one more
 /// verdict.
-/// After 32 samples every other one is of near correspondences: with few samples and most correspondences wrong it is those
-/// that find the pose.
+/// After 32 samples every other one (every fourth where there are scores) is of near correspondences: with few samples and
+/// most correspondences wrong it is those that find the pose.
 ///
 /// # References
 /// D. Nister, "An efficient solution to the five-point relative pose problem", TPAMI 2004 (the minimal problem);

@@ -52,7 +52,8 @@ impl<T: Real, B: EpipolarBlock<T>> PoseProblem<'_, T, B> {
         }
         let all = agreeing.iter().sum::<u32>();
         let wrong = ((self.whole_blocks().len() * LANES) as u32).saturating_sub(all);
-        let others = core::cmp::min(wrong * MISPAIRED[0] / core::cmp::max(all, 1), MISPAIRED[2]);
+        let others =
+            core::cmp::min(wrong.saturating_mul(MISPAIRED[0]) / core::cmp::max(all, 1), MISPAIRED[2]);
         let others = core::cmp::max(others, MISPAIRED[1]) as usize;
         let mispaired =
             self.for_each_mispaired(others, &mut |block| add(&mut accidents, &frame, block, within));
